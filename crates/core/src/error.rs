@@ -1,0 +1,201 @@
+//! Every way in which an evaluation can be refused. Each message is one line: what was wrong, what was expected, what was
+//! found, and what to do.
+
+use std::fmt;
+
+/// Which signal of a pair an error speaks of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Signal {
+    /// The displacement that was asked for.
+    Target,
+    /// The displacement that the sensor reported.
+    Measured,
+    /// The measured restoring force.
+    Force,
+}
+
+impl fmt::Display for Signal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Signal::Target => "target",
+            Signal::Measured => "measured",
+            Signal::Force => "force",
+        })
+    }
+}
+
+/// What was wrong with the samples or the settings.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Error {
+    /// A signal has another length than the target.
+    Length {
+        /// The signal that differs.
+        signal: Signal,
+        /// Samples of the target.
+        expected: usize,
+        /// Samples of the signal.
+        found: usize,
+    },
+    /// Fewer samples than can be judged.
+    TooShort {
+        /// The least number of samples.
+        expected: usize,
+        /// Samples given.
+        found: usize,
+    },
+    /// NaN or infinite samples.
+    NotFinite {
+        /// The signal that holds them.
+        signal: Signal,
+        /// How many of its samples are NaN or infinite.
+        count: usize,
+        /// Index of the first.
+        first: usize,
+    },
+    /// The target never moves.
+    ConstantTarget {
+        /// Its value.
+        value: f64,
+    },
+    /// Finite samples so large or so small that their powers leave the range of double precision.
+    Range {
+        /// Largest magnitude of the target.
+        peak: f64,
+        /// Weight power in force.
+        weight_power: u32,
+    },
+    /// The target has no energy at the bins that are kept.
+    NoEnergy,
+    /// The sampling rate is not a positive number.
+    Rate {
+        /// The rate given.
+        found: f64,
+    },
+    /// A decimation factor is not a power of two.
+    NotPowerOfTwo {
+        /// Name of the setting.
+        name: &'static str,
+        /// The factor given.
+        found: usize,
+    },
+    /// P, Q and the band together leave no frequency bin.
+    NoBin {
+        /// Length of the zero-padded record.
+        fft_len: usize,
+        /// P.
+        data_decimation: usize,
+        /// Q.
+        frequency_decimation: usize,
+        /// Lowest and highest frequency that P and Q leave, in hertz; NaN where they leave none.
+        available_hz: (f64, f64),
+        /// The band asked for.
+        band_hz: Option<(f64, f64)>,
+    },
+    /// The band's ends are not finite, negative, or exchanged.
+    Band {
+        /// Lower end, in hertz.
+        low_hz: f64,
+        /// Upper end, in hertz.
+        high_hz: f64,
+    },
+    /// The weight power is outside 1 to 16.
+    WeightPower {
+        /// The power given.
+        found: u32,
+    },
+    /// A duration or ratio is out of range.
+    Setting {
+        /// Name of the setting.
+        name: &'static str,
+        /// What it must be.
+        expected: String,
+        /// What it was.
+        found: f64,
+    },
+    /// The record is shorter than the filter of the Chebyshev decimator needs.
+    TooShortForChebyshev {
+        /// Least number of samples.
+        expected: usize,
+        /// Samples given.
+        found: usize,
+    },
+    /// A plan was used on a pair of another length or rate.
+    Plan {
+        /// Length and rate of the plan.
+        expected: (usize, f64),
+        /// Length and rate of the pair.
+        found: (usize, f64),
+    },
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Error::Length { signal, expected, found } => write!(
+                f,
+                "{signal} has {found} samples but target has {expected}: both must cover the same samples"
+            ),
+            Error::TooShort { expected, found } => {
+                write!(f, "{found} samples are too few: at least {expected} are needed")
+            }
+            Error::NotFinite { signal, count, first } => write!(
+                f,
+                "{signal} has {count} NaN or infinite {} (first at index {first}): every sample must be a finite number; \
+                 fill the gaps or cut them away",
+                if *count == 1 { "sample" } else { "samples" }
+            ),
+            Error::ConstantTarget { value } => write!(
+                f,
+                "target is constant ({value}): it must move for its tracking to be judged; is this the right channel?"
+            ),
+            Error::Range { peak, weight_power } => write!(
+                f,
+                "target's magnitudes (peak {peak:e}) raised to the weight power {weight_power} leave the range of double \
+                 precision: rescale the channels or lower the weight power"
+            ),
+            Error::NoEnergy => write!(
+                f,
+                "target has no energy at the bins that are kept: widen the band or lower P and Q"
+            ),
+            Error::Rate { found } => write!(f, "rate_hz must be a positive finite number, not {found}"),
+            Error::NotPowerOfTwo { name, found } => {
+                write!(f, "{name} must be a power of two (1, 2, 4, ...), not {found}")
+            }
+            Error::NoBin { fft_len, data_decimation, frequency_decimation, available_hz, band_hz } => {
+                write!(f, "no frequency bin is left: P = {data_decimation} and Q = {frequency_decimation} on {fft_len} points ")?;
+                if available_hz.0.is_finite() {
+                    write!(f, "keep {} to {} Hz", available_hz.0, available_hz.1)?;
+                    if let Some((low, high)) = band_hz {
+                        write!(f, " and the band asks for a bin in {low} to {high} Hz")?;
+                    }
+                    write!(f, "; widen the band or lower P or Q")
+                } else {
+                    write!(f, "keep nothing; P times Q must be at most {}", fft_len / 2)
+                }
+            }
+            Error::Band { low_hz, high_hz } => write!(
+                f,
+                "band_hz must be two finite frequencies 0 <= low <= high, not ({low_hz}, {high_hz})"
+            ),
+            Error::WeightPower { found } => {
+                write!(f, "weight_power must be a whole number from 1 to 16, not {found}")
+            }
+            Error::Setting { name, expected, found } => write!(f, "{name} must be {expected}, not {found}"),
+            Error::TooShortForChebyshev { expected, found } => write!(
+                f,
+                "{found} samples are too few for the chebyshev decimator: at least {expected} are needed; use the spectral one"
+            ),
+            Error::Plan { expected, found } => write!(
+                f,
+                "this evaluator is planned for {} samples at {} Hz, not for {} at {} Hz",
+                expected.0, expected.1, found.0, found.1
+            ),
+        }
+    }
+}
+
+impl std::error::Error for Error {}
+
+/// Result of this crate.
+pub type Result<T> = std::result::Result<T, Error>;

@@ -1,0 +1,36 @@
+//! Did the actuator do what the simulation asked?
+//!
+//! The frequency-domain evaluation of actuator tracking in real-time hybrid simulation: Guo, Xu and Chen (2014), Smart
+//! Structures and Systems 14(6), 1197-1220. Numerics only: no files, no clock, no log.
+//!
+//! Data flows through the modules in this order:
+//!
+//! 1. [`pair`]: target and measured displacement on one clock, checked once.
+//! 2. [`window`]: detrending and windows.
+//! 3. [`decimate`]: P, as a short cascade or as the paper's Chebyshev filter.
+//! 4. `spectrum`: Q by folding, the transform, the kept bins.
+//! 5. [`tracking`]: Eqs 6-12, amplitude and delay; [`Evaluator`] is the plan, [`EvaluatorState`] its buffers.
+//! 6. [`moving`]: the same over moving windows.
+//! 7. [`response`]: gain, phase, delay and coherence over frequency.
+//! 8. [`indices`]: the time-domain indices in use beside them.
+//!
+//! Signs: a positive delay means that measured lags target; amplitude 1 is perfect. Units are SI.
+
+pub mod decimate;
+pub mod error;
+pub mod indices;
+pub mod moving;
+pub mod pair;
+pub mod response;
+mod spectrum;
+pub mod tracking;
+pub mod window;
+
+pub use decimate::Decimator;
+pub use error::{Error, Result, Signal};
+pub use indices::{IndexHistories, Indices, index_histories, indices};
+pub use moving::{MovingConfig, MovingTracking, evaluate_moving};
+pub use pair::Pair;
+pub use response::{FrequencyResponse, ResponseConfig, frequency_response};
+pub use tracking::{Estimator, Evaluator, EvaluatorConfig, EvaluatorState, Spectra, Tracking};
+pub use window::{Detrend, Window};

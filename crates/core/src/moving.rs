@@ -1,0 +1,131 @@
+//! The evaluation over moving windows: A(t), d(t), f_eq(t).
+
+use crate::error::{Error, Result};
+use crate::pair::{MIN_SAMPLES, Pair};
+use crate::tracking::{Evaluator, EvaluatorConfig};
+
+/// The user's numbers for a moving evaluation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MovingConfig {
+    /// Length of the window, in seconds.
+    pub window_s: f64,
+    /// From one window to the next, in seconds.
+    pub hop_s: f64,
+    /// A window is judged where the target's standard deviation in it is at least this share of the whole record's.
+    pub minimum_std_ratio: f64,
+    /// How each window is evaluated.
+    pub evaluator: EvaluatorConfig,
+}
+
+impl Default for MovingConfig {
+    fn default() -> Self {
+        Self { window_s: 4.0, hop_s: 0.25, minimum_std_ratio: 0.05, evaluator: EvaluatorConfig::default() }
+    }
+}
+
+/// One entry a window. Where `valid` is false the target has too little energy to judge by, and the numbers are NaN.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct MovingTracking {
+    /// Centre of the window, in seconds from the first sample: (start + (W - 1) / 2) / rate.
+    pub time_s: Vec<f64>,
+    /// A (Eq 11a).
+    pub amplitude: Vec<f64>,
+    /// phi, in radians (Eq 11b).
+    pub phase_rad: Vec<f64>,
+    /// d, in seconds (Eq 10); positive when measured lags.
+    pub delay_s: Vec<f64>,
+    /// f_eq, in hertz (Eq 7).
+    pub equivalent_frequency_hz: Vec<f64>,
+    /// Whether the window could be judged.
+    pub valid: Vec<bool>,
+}
+
+/// Evaluates windows of round(window_s rate) samples that start at 0, H, 2 H, ... with H = round(hop_s rate), at least one.
+///
+/// Each reading is that of [`Evaluator::evaluate`] on the window's samples alone.
+///
+/// # Errors
+/// [`Error::Setting`] for a window longer than the record or a hop or ratio out of range; [`Error::NotFinite`]; whatever
+/// [`Evaluator::new`] refuses for one window.
+pub fn evaluate_moving(pair: &Pair<'_>, config: &MovingConfig) -> Result<MovingTracking> {
+    pair.check_finite()?;
+    let (n, rate_hz) = (pair.n_samples(), pair.rate_hz());
+    let window = samples_of("window_s", config.window_s, rate_hz, MIN_SAMPLES, n)?;
+    let hop = samples_of("hop_s", config.hop_s, rate_hz, 1, usize::MAX)?;
+    let ratio = config.minimum_std_ratio;
+    if !(ratio.is_finite() && (0.0..1.0).contains(&ratio)) {
+        let expected = "a share from 0 to below 1".to_owned();
+        return Err(Error::Setting { name: "minimum_std_ratio", expected, found: ratio });
+    }
+    let evaluator = Evaluator::new(window, rate_hz, config.evaluator)?;
+    let mut moving = evaluator.moving(pair, hop);
+    let variance = RunningVariance::new(pair.target());
+    let least = ratio * ratio * variance.of(0, n);
+    let starts = (0..n - window + 1).step_by(hop);
+    let mut out = MovingTracking::with_capacity(starts.len());
+    for start in starts {
+        let tracking = if variance.of(start, start + window) >= least { moving.at(start).ok() } else { None };
+        let number = |f: fn(&crate::Tracking) -> f64| tracking.as_ref().map_or(f64::NAN, f);
+        out.time_s.push((start as f64 + (window - 1) as f64 / 2.0) / rate_hz);
+        out.amplitude.push(number(|t| t.amplitude));
+        out.phase_rad.push(number(|t| t.phase_rad));
+        out.delay_s.push(number(|t| t.delay_s));
+        out.equivalent_frequency_hz.push(number(|t| t.equivalent_frequency_hz));
+        out.valid.push(tracking.is_some());
+    }
+    Ok(out)
+}
+
+impl MovingTracking {
+    fn with_capacity(n: usize) -> Self {
+        Self {
+            time_s: Vec::with_capacity(n),
+            amplitude: Vec::with_capacity(n),
+            phase_rad: Vec::with_capacity(n),
+            delay_s: Vec::with_capacity(n),
+            equivalent_frequency_hz: Vec::with_capacity(n),
+            valid: Vec::with_capacity(n),
+        }
+    }
+}
+
+/// A duration in whole samples within `least..=most`.
+fn samples_of(name: &'static str, duration_s: f64, rate_hz: f64, least: usize, most: usize) -> Result<usize> {
+    let samples = (duration_s * rate_hz).round();
+    if !samples.is_finite() || samples < least as f64 || samples > most as f64 {
+        let low = least as f64 / rate_hz;
+        let expected = if most == usize::MAX {
+            format!("at least {low} s ({least} sample)")
+        } else {
+            format!("from {low} s ({least} samples) to the record's {} s", most as f64 / rate_hz)
+        };
+        return Err(Error::Setting { name, expected, found: duration_s });
+    }
+    Ok(samples as usize)
+}
+
+/// Variance of any stretch from running sums, about the record's own mean so that an offset does not cancel digits.
+struct RunningVariance {
+    sums: Vec<(f64, f64)>,
+}
+
+impl RunningVariance {
+    fn new(samples: &[f64]) -> Self {
+        let mean = samples.iter().sum::<f64>() / samples.len() as f64;
+        let mut total = (0.0, 0.0);
+        let mut sums = Vec::with_capacity(samples.len() + 1);
+        sums.push(total);
+        for v in samples {
+            let v = v - mean;
+            total = (total.0 + v, total.1 + v * v);
+            sums.push(total);
+        }
+        Self { sums }
+    }
+
+    fn of(&self, from: usize, to: usize) -> f64 {
+        let n = (to - from) as f64;
+        let (sum, squares) = (self.sums[to].0 - self.sums[from].0, self.sums[to].1 - self.sums[from].1);
+        (squares / n - (sum / n) * (sum / n)).max(0.0)
+    }
+}

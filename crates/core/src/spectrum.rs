@@ -1,0 +1,387 @@
+//! From samples to the bins that P, Q and the band keep.
+//!
+//! The record of L samples is detrended, windowed and zero-padded to n = 2^ceil(log2 L) points; p = n / 2 (Eq 8); bin k lies
+//! at f_k = k rate / n (Eq 9). Kept are k = Q, 2 Q, 3 Q, ... up to p / P, inside the band (both ends included).
+//!
+//! * Every Q-th bin of an n-point transform is the (n / Q)-point transform of the record *folded*: cut into blocks of
+//!   n / Q samples and added up. One pass of additions, no approximation.
+//! * The lowest n / (2 P) bins come from a shorter sequence ([`crate::decimate`]), whose droop is divided out.
+//! * The real sequence is transformed as half as many complex points, and unpacked while it is summed.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use num_complex::Complex;
+use rustfft::{Fft, FftPlanner};
+
+use crate::decimate::Cascade;
+use crate::error::{Error, Result};
+use crate::window::{Detrend, Window};
+
+/// Lanes in which bins are unpacked and summed.
+pub(crate) const LANES: usize = 4;
+
+/// What decides which bins are kept and how a record becomes bins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct SpectrumConfig {
+    pub(crate) n_samples: usize,
+    pub(crate) rate_hz: f64,
+    pub(crate) data_decimation: usize,
+    pub(crate) frequency_decimation: usize,
+    pub(crate) window: Window,
+    pub(crate) detrend: Detrend,
+    pub(crate) band_hz: Option<(f64, f64)>,
+}
+
+/// The checked, immutable plan: one for all records of one length.
+pub(crate) struct Spectrum {
+    config: SpectrumConfig,
+    fft_len: usize,
+    folded_len: usize,
+    window: Option<Vec<f64>>,
+    cascade: Cascade,
+    fft: Arc<dyn Fft<f64>>,
+    unpack: Unpack,
+    /// First and last kept bin of the folded transform.
+    first: usize,
+    last: usize,
+}
+
+/// Buffers of one evaluation: the packed transforms of both signals and the scratch between.
+#[derive(Debug, Clone)]
+pub(crate) struct SpectrumState {
+    pub(crate) target: Vec<Complex<f64>>,
+    pub(crate) measured: Vec<Complex<f64>>,
+    /// Input of the cascade, and scratch of the transform: never needed at once.
+    scratch: Vec<Complex<f64>>,
+    passes: Vec<f64>,
+}
+
+impl Spectrum {
+    /// # Errors
+    /// [`Error::NotPowerOfTwo`], [`Error::Band`], [`Error::NoBin`].
+    pub(crate) fn new(config: SpectrumConfig) -> Result<Self> {
+        let SpectrumConfig { n_samples, rate_hz, data_decimation, frequency_decimation, .. } = config;
+        for (name, factor) in [("data_decimation", data_decimation), ("frequency_decimation", frequency_decimation)] {
+            if !factor.is_power_of_two() {
+                return Err(Error::NotPowerOfTwo { name, found: factor });
+            }
+        }
+        if let Some((low_hz, high_hz)) = config.band_hz {
+            if !(low_hz.is_finite() && high_hz.is_finite() && 0.0 <= low_hz && low_hz <= high_hz) {
+                return Err(Error::Band { low_hz, high_hz });
+            }
+        }
+        let fft_len = n_samples.next_power_of_two();
+        let delta_f = rate_hz / fft_len as f64 * frequency_decimation as f64;
+        let (mut first, mut last) = (1, fft_len / 2 / data_decimation / frequency_decimation);
+        let available_hz = if last == 0 { (f64::NAN, f64::NAN) } else { (delta_f, last as f64 * delta_f) };
+        if let Some((low, high)) = config.band_hz {
+            // Compare frequencies, not quotients: an end that is a bin is kept.
+            first = first.max(((low / delta_f).floor() as usize).min(last + 1).saturating_sub(1));
+            while first <= last && (first as f64) * delta_f < low {
+                first += 1;
+            }
+            last = last.min((high / delta_f).ceil() as usize + 1);
+            while last >= first && (last as f64) * delta_f > high {
+                last -= 1;
+            }
+            first = first.max(1);
+        }
+        if last < first {
+            return Err(Error::NoBin {
+                fft_len,
+                data_decimation,
+                frequency_decimation,
+                available_hz,
+                band_hz: config.band_hz,
+            });
+        }
+        let folded_len = fft_len / frequency_decimation;
+        let cascade = Cascade::new(folded_len, data_decimation);
+        let half = cascade.out_len() / 2;
+        Ok(Self {
+            config,
+            fft_len,
+            folded_len,
+            window: config.window.coefficients(n_samples),
+            fft: FftPlanner::new().plan_fft_forward(half),
+            unpack: Unpack::new(half),
+            cascade,
+            first,
+            last,
+        })
+    }
+
+    pub(crate) fn config(&self) -> &SpectrumConfig {
+        &self.config
+    }
+
+    /// n, the length of the zero-padded record.
+    pub(crate) fn fft_len(&self) -> usize {
+        self.fft_len
+    }
+
+    pub(crate) fn n_bins(&self) -> usize {
+        self.last - self.first + 1
+    }
+
+    /// Spacing of the kept bins, Q rate / n, in hertz.
+    pub(crate) fn delta_f_hz(&self) -> f64 {
+        self.config.rate_hz / self.fft_len as f64 * self.config.frequency_decimation as f64
+    }
+
+    /// Index of the first kept bin in units of [`Spectrum::delta_f_hz`].
+    pub(crate) fn first(&self) -> usize {
+        self.first
+    }
+
+    /// Gain of the cascade at each kept bin; `None` where there is no cascade.
+    pub(crate) fn droop(&self) -> Option<Vec<f64>> {
+        if self.cascade.is_empty() {
+            return None;
+        }
+        Some((self.first..=self.last).map(|j| self.cascade.gain(j)).collect())
+    }
+
+    pub(crate) fn state(&self) -> SpectrumState {
+        let half = self.cascade.out_len() / 2;
+        let zero = Complex::new(0.0, 0.0);
+        let (_, input_len) = self.cascade.input_layout();
+        let input_len = if self.cascade.is_empty() { 0 } else { input_len.div_ceil(2) };
+        SpectrumState {
+            target: vec![zero; half],
+            measured: vec![zero; half],
+            scratch: vec![zero; self.fft.get_inplace_scratch_len().max(input_len)],
+            passes: vec![0.0; self.cascade.scratch_len()],
+        }
+    }
+
+    /// Transforms both signals into the state's packed buffers.
+    #[inline(always)]
+    pub(crate) fn transform(&self, state: &mut SpectrumState, target: &[f64], measured: &[f64]) {
+        let SpectrumState { target: target_bins, measured: measured_bins, scratch, passes } = state;
+        for (samples, bins) in [(target, target_bins), (measured, measured_bins)] {
+            self.shorten(samples, bytemuck::cast_slice_mut(bins), scratch, passes);
+            self.fft.process_with_scratch(bins, scratch);
+        }
+    }
+
+    /// Detrends, windows, zero-pads, folds and decimates one signal into `out`.
+    #[inline(always)]
+    fn shorten(&self, samples: &[f64], out: &mut [f64], scratch: &mut [Complex<f64>], passes: &mut [f64]) {
+        if self.cascade.is_empty() {
+            self.fold(samples, out);
+            return;
+        }
+        let (start, len) = self.cascade.input_layout();
+        let input = &mut bytemuck::cast_slice_mut(scratch)[..len];
+        self.fold(samples, &mut input[start..start + self.folded_len]);
+        self.cascade.run(input, samples.len().min(self.folded_len), passes, out);
+    }
+
+    /// out[i] = sum over blocks of (w x)[i + block * n / Q], zero past the last sample.
+    #[inline(always)]
+    fn fold(&self, samples: &[f64], out: &mut [f64]) {
+        // A strip of the output stays in the nearest cache while the blocks pass by.
+        const STRIP: usize = 1024;
+        let block_len = out.len();
+        let line = self.config.detrend.line(samples);
+        let window = self.window.as_deref();
+        for (s, strip) in out.chunks_mut(STRIP).enumerate() {
+            let mut at = s * STRIP;
+            let mut added = false;
+            while at < samples.len() {
+                let len = strip.len().min(samples.len() - at);
+                let x = &samples[at..at + len];
+                match (window, line, added) {
+                    (None, None, false) => strip[..len].copy_from_slice(x),
+                    (None, None, true) => strip[..len].iter_mut().zip(x).for_each(|(y, x)| *y += x),
+                    (Some(w), None, _) => {
+                        let w = &w[at..at + len];
+                        if added {
+                            strip[..len].iter_mut().zip(x.iter().zip(w)).for_each(|(y, (x, w))| *y += w * x);
+                        } else {
+                            strip[..len].iter_mut().zip(x.iter().zip(w)).for_each(|(y, (x, w))| *y = w * x);
+                        }
+                    }
+                    (w, Some(line), _) => {
+                        for i in 0..len {
+                            let v = x[i] - line.at(at + i);
+                            let v = w.map_or(v, |w| w[at + i] * v);
+                            strip[i] = if added { strip[i] + v } else { v };
+                        }
+                    }
+                }
+                if !added {
+                    strip[len..].fill(0.0);
+                    added = true;
+                }
+                at += block_len;
+            }
+            if !added {
+                strip.fill(0.0);
+            }
+        }
+    }
+
+    /// Hands every kept bin to `sink`, some in groups of [`LANES`] neighbours, in no particular order.
+    #[inline(always)]
+    pub(crate) fn visit<S: Sink>(&self, state: &SpectrumState, sink: &mut S) {
+        self.unpack.visit(&state.target, &state.measured, self.first, self.last, sink);
+    }
+}
+
+/// Takes bins of target and measured as they are unpacked.
+pub(crate) trait Sink {
+    /// Bins at `indices` (of the folded transform): real and imaginary parts of target and measured.
+    fn take<const W: usize>(&mut self, bins: &Bins<W>);
+}
+
+/// W bins of both signals.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Bins<const W: usize> {
+    /// Index of the lowest of them; they are neighbours, in ascending order.
+    pub(crate) first: usize,
+    pub(crate) target_re: [f64; W],
+    pub(crate) target_im: [f64; W],
+    pub(crate) measured_re: [f64; W],
+    pub(crate) measured_im: [f64; W],
+}
+
+/// The packed transform of a real sequence of N = 2 H points, z_i = x_2i + j x_2i+1, is unpacked by
+///
+/// ```text
+/// X_k = E_k + W^k D_k,   E_k = (Z_k + conj Z_(H-k)) / 2,   D_k = -j (Z_k - conj Z_(H-k)) / 2,   W = exp(-2 pi j / N)
+/// X_(H-k) = conj(E_k - W^k D_k)
+/// ```
+struct Unpack {
+    half: usize,
+    /// W^k for k = 1, 1 + LANES, 1 + 2 LANES, ...
+    coarse: Vec<Complex<f64>>,
+    /// W^0 .. W^(LANES-1)
+    fine: [Complex<f64>; LANES],
+}
+
+impl Unpack {
+    fn new(half: usize) -> Self {
+        let twiddle = |k: usize| Complex::from_polar(1.0, -PI * k as f64 / half as f64);
+        let groups = (half / 2).saturating_sub(1) / LANES;
+        Self {
+            half,
+            coarse: (0..groups).map(|g| twiddle(1 + g * LANES)).collect(),
+            fine: std::array::from_fn(twiddle),
+        }
+    }
+
+    /// Bin `k` alone, 0 <= k <= H.
+    #[inline(always)]
+    fn bin(&self, z: &[Complex<f64>], k: usize) -> Complex<f64> {
+        let half = self.half;
+        let (a, b) = (z[k % half], z[(half - k) % half].conj());
+        let twiddle = Complex::from_polar(1.0, -PI * k as f64 / half as f64);
+        let difference = a - b;
+        (a + b) * 0.5 + twiddle * Complex::new(difference.im, -difference.re) * 0.5
+    }
+
+    #[inline(always)]
+    fn single<S: Sink>(&self, target: &[Complex<f64>], measured: &[Complex<f64>], k: usize, sink: &mut S) {
+        let (t, m) = (self.bin(target, k), self.bin(measured, k));
+        sink.take(&Bins::<1> {
+            first: k,
+            target_re: [t.re],
+            target_im: [t.im],
+            measured_re: [m.re],
+            measured_im: [m.im],
+        });
+    }
+
+    #[inline(always)]
+    fn visit<S: Sink>(
+        &self,
+        target: &[Complex<f64>],
+        measured: &[Complex<f64>],
+        first: usize,
+        last: usize,
+        sink: &mut S,
+    ) {
+        let half = self.half;
+        // Pairs (k, H - k), 0 < k < H / 2, in groups; the lower of each pair always, the upper where it is kept.
+        let grouped = self.coarse.len() * LANES;
+        let kept = |k: usize| first <= k && k <= last;
+        for (g, &coarse) in self.coarse.iter().enumerate() {
+            let k = 1 + g * LANES;
+            let upper = half - k - (LANES - 1);
+            let lower_needed = k <= last && k + LANES > first;
+            let upper_needed = upper <= last && upper + LANES > first;
+            if !(lower_needed || upper_needed) {
+                continue;
+            }
+            let mut twiddle = [Complex::new(0.0, 0.0); LANES];
+            for i in 0..LANES {
+                twiddle[i] = coarse * self.fine[i];
+            }
+            let (t_low, t_high) = unpack_group(target, half, k, &twiddle);
+            let (m_low, m_high) = unpack_group(measured, half, k, &twiddle);
+            for (needed, base, (t_re, t_im), (m_re, m_im)) in
+                [(lower_needed, k, t_low, m_low), (upper_needed, upper, t_high, m_high)]
+            {
+                if !needed {
+                    continue;
+                }
+                if first <= base && base + LANES - 1 <= last {
+                    sink.take(&Bins::<LANES> {
+                        first: base,
+                        target_re: t_re,
+                        target_im: t_im,
+                        measured_re: m_re,
+                        measured_im: m_im,
+                    });
+                } else {
+                    for i in (0..LANES).filter(|i| kept(base + i)) {
+                        sink.take(&Bins::<1> {
+                            first: base + i,
+                            target_re: [t_re[i]],
+                            target_im: [t_im[i]],
+                            measured_re: [m_re[i]],
+                            measured_im: [m_im[i]],
+                        });
+                    }
+                }
+            }
+        }
+        // What the groups leave: the middle bins and the Nyquist bin (k = H).
+        for k in (grouped + 1).max(first)..=(half - grouped).min(last + 1).saturating_sub(1) {
+            if k < half - grouped && k != half {
+                self.single(target, measured, k, sink);
+            }
+        }
+        if kept(half) {
+            self.single(target, measured, half, sink);
+        }
+    }
+}
+
+type Lanes = ([f64; LANES], [f64; LANES]);
+
+/// Bins k .. k + LANES and H - k - LANES + 1 ..= H - k of one packed transform.
+#[inline(always)]
+fn unpack_group(z: &[Complex<f64>], half: usize, k: usize, twiddle: &[Complex<f64>; LANES]) -> (Lanes, Lanes) {
+    let low = &z[k..k + LANES];
+    let high = &z[half - k - (LANES - 1)..half - k + 1];
+    let mut lower = ([0.0; LANES], [0.0; LANES]);
+    let mut upper = ([0.0; LANES], [0.0; LANES]);
+    for i in 0..LANES {
+        let (a, b) = (low[i], high[LANES - 1 - i]);
+        let (even_re, even_im) = (0.5 * (a.re + b.re), 0.5 * (a.im - b.im));
+        // -j (a - conj b) / 2
+        let (odd_re, odd_im) = (0.5 * (a.im + b.im), -0.5 * (a.re - b.re));
+        let (t_re, t_im) =
+            (twiddle[i].re * odd_re - twiddle[i].im * odd_im, twiddle[i].re * odd_im + twiddle[i].im * odd_re);
+        lower.0[i] = even_re + t_re;
+        lower.1[i] = even_im + t_im;
+        upper.0[LANES - 1 - i] = even_re - t_re;
+        upper.1[LANES - 1 - i] = t_im - even_im;
+    }
+    (lower, upper)
+}

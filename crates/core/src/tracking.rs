@@ -1,0 +1,454 @@
+//! Eqs 6 to 12: one complex number for the whole record.
+
+use std::f64::consts::PI;
+
+use num_complex::Complex;
+use pulp::Arch;
+
+use crate::decimate::{Chebyshev, Decimator};
+use crate::error::{Error, Result};
+use crate::pair::{Pair, check_rate};
+use crate::spectrum::{Bins, LANES, Sink, Spectrum, SpectrumConfig, SpectrumState};
+use crate::window::{Detrend, Window};
+
+/// Highest weight power taken.
+pub const MAX_WEIGHT_POWER: u32 = 16;
+
+/// How gain and delay are estimated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
+pub enum Estimator {
+    /// The published weighted average, Eq 12.
+    #[default]
+    Fei,
+}
+
+impl Estimator {
+    /// All choices with their names.
+    pub const NAMES: [(&'static str, Estimator); 1] = [("fei", Estimator::Fei)];
+}
+
+/// The user's numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EvaluatorConfig {
+    /// How gain and delay are estimated.
+    pub estimator: Estimator,
+    /// P, a power of two: keeps the frequencies up to rate / (2 P).
+    pub data_decimation: usize,
+    /// Q, a power of two: keeps every Q-th bin.
+    pub frequency_decimation: usize,
+    /// How P is carried out.
+    pub decimator: Decimator,
+    /// l of Eqs 7 and 12, 1 to 16: bins are weighted by |I|^l.
+    pub weight_power: u32,
+    /// Window over the record.
+    pub window: Window,
+    /// What is subtracted before the window.
+    pub detrend: Detrend,
+    /// Lowest and highest frequency kept, both included, in hertz.
+    pub band_hz: Option<(f64, f64)>,
+}
+
+impl Default for EvaluatorConfig {
+    fn default() -> Self {
+        Self {
+            estimator: Estimator::Fei,
+            data_decimation: 1,
+            frequency_decimation: 1,
+            decimator: Decimator::Spectral,
+            weight_power: 2,
+            window: Window::Boxcar,
+            detrend: Detrend::None,
+            band_hz: None,
+        }
+    }
+}
+
+/// Amplitude and delay of measured over target.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tracking {
+    /// sum O conj(I) |I|^(l-2) / sum |I|^l (Eq 12 without its quotient).
+    pub fei: Complex<f64>,
+    /// A = |FEI| (Eq 11a); 1 is perfect.
+    pub amplitude: f64,
+    /// phi = atan2(Im FEI, Re FEI), in radians (Eq 11b); negative on lag.
+    pub phase_rad: f64,
+    /// d = -phi / (2 pi f_eq), in seconds (Eq 10); positive when measured lags.
+    pub delay_s: f64,
+    /// f_eq = sum f |I|^l / sum |I|^l, in hertz (Eq 7).
+    pub equivalent_frequency_hz: f64,
+}
+
+/// The bins behind a [`Tracking`], one entry a kept bin.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Spectra {
+    /// f_k, in hertz.
+    pub frequency_hz: Vec<f64>,
+    /// |I_k|^l / sum |I|^l; they sum to one.
+    pub weights: Vec<f64>,
+    /// I_k, the transform of the detrended, windowed, zero-padded target, in unit of the signal (Eq 1a).
+    pub target: Vec<Complex<f64>>,
+    /// O_k (Eq 1b).
+    pub measured: Vec<Complex<f64>>,
+}
+
+/// The checked plan for records of one length and rate: everything that does not depend on the samples.
+///
+/// ```
+/// use rthstrack::{Evaluator, EvaluatorConfig, Pair};
+/// let rate_hz = 1000.0;
+/// let lag = 5e-3; // 5 samples
+/// let target: Vec<f64> = (0..2000).map(|i| (f64::from(i) * 0.01).sin() + (f64::from(i) * 0.023).sin()).collect();
+/// let measured: Vec<f64> = (0..2000)
+///     .map(|i| f64::from(i) - 5.0)
+///     .map(|i| 1.1 * ((i * 0.01).sin() + (i * 0.023).sin()))
+///     .collect();
+/// let evaluator = Evaluator::new(target.len(), rate_hz, EvaluatorConfig::default())?;
+/// let mut state = evaluator.state();
+/// let tracking = evaluator.evaluate(&mut state, &Pair::new(&target, &measured, rate_hz)?)?;
+/// assert!((tracking.delay_s - lag).abs() < 0.3e-3); // FEI's own error, from the ends of the record
+/// # Ok::<(), rthstrack::Error>(())
+/// ```
+pub struct Evaluator {
+    config: EvaluatorConfig,
+    n_samples: usize,
+    rate_hz: f64,
+    chebyshev: Option<Chebyshev>,
+    spectrum: Spectrum,
+    droop: Option<Vec<f64>>,
+    arch: Arch,
+}
+
+/// What changes during an evaluation: its buffers. Make one a thread.
+#[derive(Debug, Clone)]
+pub struct EvaluatorState {
+    spectrum: SpectrumState,
+    decimated: [Vec<f64>; 2],
+    filter: Vec<f64>,
+}
+
+impl Evaluator {
+    /// Plans the evaluation of records of `n_samples` samples at `rate_hz`.
+    ///
+    /// # Errors
+    /// Whatever makes the settings impossible for this length and rate; see [`Error`].
+    pub fn new(n_samples: usize, rate_hz: f64, config: EvaluatorConfig) -> Result<Self> {
+        check_rate(rate_hz)?;
+        if n_samples < crate::pair::MIN_SAMPLES {
+            return Err(Error::TooShort { expected: crate::pair::MIN_SAMPLES, found: n_samples });
+        }
+        if !(1..=MAX_WEIGHT_POWER).contains(&config.weight_power) {
+            return Err(Error::WeightPower { found: config.weight_power });
+        }
+        let chebyshev = match config.decimator {
+            Decimator::Chebyshev if config.data_decimation != 1 => {
+                if n_samples < Chebyshev::MIN_SAMPLES {
+                    return Err(Error::TooShortForChebyshev { expected: Chebyshev::MIN_SAMPLES, found: n_samples });
+                }
+                Some(Chebyshev::new(config.data_decimation)?)
+            }
+            _ => None,
+        };
+        let (len, rate, data_decimation) = match &chebyshev {
+            Some(c) => (c.out_len(n_samples), rate_hz / config.data_decimation as f64, 1),
+            None => (n_samples, rate_hz, config.data_decimation),
+        };
+        let spectrum = Spectrum::new(SpectrumConfig {
+            n_samples: len,
+            rate_hz: rate,
+            data_decimation,
+            frequency_decimation: config.frequency_decimation,
+            window: config.window,
+            detrend: config.detrend,
+            band_hz: config.band_hz,
+        })?;
+        let droop = spectrum.droop();
+        Ok(Self { config, n_samples, rate_hz, chebyshev, spectrum, droop, arch: Arch::new() })
+    }
+
+    /// The settings.
+    pub fn config(&self) -> &EvaluatorConfig {
+        &self.config
+    }
+
+    /// Length of the records this is planned for.
+    pub fn n_samples(&self) -> usize {
+        self.n_samples
+    }
+
+    /// Their rate.
+    pub fn rate_hz(&self) -> f64 {
+        self.rate_hz
+    }
+
+    /// Number of frequency bins kept.
+    pub fn n_bins(&self) -> usize {
+        self.spectrum.n_bins()
+    }
+
+    /// Spacing of the kept bins, Q rate / n, in hertz (Eq 9).
+    pub fn delta_f_hz(&self) -> f64 {
+        self.spectrum.delta_f_hz()
+    }
+
+    /// Buffers for [`Evaluator::evaluate`].
+    pub fn state(&self) -> EvaluatorState {
+        let (decimated, filter) = match &self.chebyshev {
+            Some(c) => (c.out_len(self.n_samples), c.scratch_len(self.n_samples)),
+            None => (0, 0),
+        };
+        EvaluatorState {
+            spectrum: self.spectrum.state(),
+            decimated: [vec![0.0; decimated], vec![0.0; decimated]],
+            filter: vec![0.0; filter],
+        }
+    }
+
+    /// Evaluates one pair (Eqs 1 to 12). Allocates nothing.
+    ///
+    /// # Errors
+    /// [`Error::Plan`] for a pair of another length or rate, [`Error::NotFinite`], [`Error::NoEnergy`], [`Error::Range`].
+    pub fn evaluate(&self, state: &mut EvaluatorState, pair: &Pair<'_>) -> Result<Tracking> {
+        self.transform(state, pair)?;
+        self.finish(self.sum(&state.spectrum), pair)
+    }
+
+    /// The same with the bins behind it.
+    ///
+    /// # Errors
+    /// Those of [`Evaluator::evaluate`].
+    pub fn evaluate_with_spectra(&self, state: &mut EvaluatorState, pair: &Pair<'_>) -> Result<(Tracking, Spectra)> {
+        let tracking = self.evaluate(state, pair)?;
+        let n = self.n_bins();
+        let mut collected = Collect {
+            first: self.spectrum.first(),
+            target: vec![Complex::default(); n],
+            measured: vec![Complex::default(); n],
+        };
+        self.spectrum.visit(&state.spectrum, &mut collected);
+        let Collect { first, mut target, mut measured } = collected;
+        if let Some(droop) = &self.droop {
+            for (k, gain) in droop.iter().enumerate() {
+                target[k] /= gain;
+                measured[k] /= gain;
+            }
+        }
+        let magnitudes: Vec<f64> = target.iter().map(|x| weight(x.norm_sqr(), self.config.weight_power)).collect();
+        let total: f64 = magnitudes.iter().sum();
+        let spectra = Spectra {
+            frequency_hz: (0..n).map(|k| (first + k) as f64 * self.delta_f_hz()).collect(),
+            weights: magnitudes.iter().map(|m| m / total).collect(),
+            target,
+            measured,
+        };
+        Ok((tracking, spectra))
+    }
+
+    fn transform(&self, state: &mut EvaluatorState, pair: &Pair<'_>) -> Result<()> {
+        let found = (pair.n_samples(), pair.rate_hz());
+        if found != (self.n_samples, self.rate_hz) {
+            return Err(Error::Plan { expected: (self.n_samples, self.rate_hz), found });
+        }
+        let EvaluatorState { spectrum, decimated: [target, measured], filter } = state;
+        let (target, measured) = match &self.chebyshev {
+            Some(chebyshev) => {
+                chebyshev.run(pair.target(), filter, target)?;
+                chebyshev.run(pair.measured(), filter, measured)?;
+                (target.as_slice(), measured.as_slice())
+            }
+            None => (pair.target(), pair.measured()),
+        };
+        self.arch.dispatch(
+            #[inline(always)]
+            || self.spectrum.transform(spectrum, target, measured),
+        );
+        Ok(())
+    }
+
+    fn sum(&self, state: &SpectrumState) -> Sums {
+        self.arch.dispatch(
+            #[inline(always)]
+            || match (self.config.weight_power, &self.droop) {
+                (2, None) => self.sum_with(state, Weigh::<2, false>::new(&[], 0)),
+                (2, Some(droop)) => self.sum_with(state, Weigh::<2, true>::new(droop, self.spectrum.first())),
+                (power, None) => self.sum_with(state, Weigh::<0, false>::with_power(&[], 0, power)),
+                (power, Some(droop)) => {
+                    self.sum_with(state, Weigh::<0, true>::with_power(droop, self.spectrum.first(), power))
+                }
+            },
+        )
+    }
+
+    #[inline(always)]
+    fn sum_with<const L: u32, const DROOP: bool>(&self, state: &SpectrumState, mut weigh: Weigh<'_, L, DROOP>) -> Sums {
+        self.spectrum.visit(state, &mut weigh);
+        weigh.sums()
+    }
+
+    /// Eqs 10 and 11 from the sums.
+    fn finish(&self, sums: Sums, pair: &Pair<'_>) -> Result<Tracking> {
+        let Sums { cross, power, moment, energy } = sums;
+        let peak = || pair.target().iter().fold(0.0f64, |p, v| p.max(v.abs()));
+        if ![cross.re, cross.im, power, moment].iter().all(|v| v.is_finite()) {
+            // A transform carries one NaN into every bin; only then is it looked for.
+            pair.check_finite()?;
+            return Err(Error::Range { peak: peak(), weight_power: self.config.weight_power });
+        }
+        // Below this the kept bins hold only the round-off of the others.
+        let round_off = self.spectrum.fft_len() as f64 * energy_at_least(pair.target()) * ROUND_OFF_SHARE;
+        if power < f64::MIN_POSITIVE / f64::EPSILON || energy <= round_off {
+            let peak = peak();
+            let vanishes = weight(peak * peak, self.config.weight_power) < f64::MIN_POSITIVE / f64::EPSILON;
+            return Err(if vanishes {
+                Error::Range { peak, weight_power: self.config.weight_power }
+            } else {
+                Error::NoEnergy
+            });
+        }
+        let fei = cross / power;
+        let equivalent_frequency_hz = moment / power * self.delta_f_hz();
+        let phase_rad = fei.im.atan2(fei.re);
+        Ok(Tracking {
+            fei,
+            amplitude: fei.norm(),
+            phase_rad,
+            delay_s: delay(phase_rad, equivalent_frequency_hz),
+            equivalent_frequency_hz,
+        })
+    }
+}
+
+/// Share of the energy that round-off alone leaves in any band: (100 eps)^2.
+const ROUND_OFF_SHARE: f64 = 5e-28;
+
+/// A cheap estimate of sum x^2 (n sum x^2 is the energy of all bins, by Parseval), from every 61st sample.
+fn energy_at_least(samples: &[f64]) -> f64 {
+    const STRIDE: usize = 61;
+    samples.iter().step_by(STRIDE).map(|v| v * v).sum::<f64>() * STRIDE as f64
+}
+
+/// d = -phi / (2 pi f), in seconds (Eq 10): a negative phase is a lag, a positive delay.
+#[inline]
+pub fn delay(phase_rad: f64, frequency_hz: f64) -> f64 {
+    -phase_rad / (2.0 * PI * frequency_hz)
+}
+
+/// |I|^l from |I|^2.
+#[inline(always)]
+fn weight(squared: f64, power: u32) -> f64 {
+    let even = squared.powi((power / 2) as i32);
+    if power % 2 == 0 { even } else { even * squared.sqrt() }
+}
+
+/// The sums of Eqs 7 and 12, frequency in bins.
+#[derive(Debug, Clone, Copy)]
+struct Sums {
+    cross: Complex<f64>,
+    power: f64,
+    moment: f64,
+    /// sum |I|^2, which is `power` for l = 2.
+    energy: f64,
+}
+
+/// Adds up O conj(I) |I|^(l-2), |I|^l and k |I|^l. `L` = 2 is compiled apart; 0 stands for any power.
+struct Weigh<'a, const L: u32, const DROOP: bool> {
+    droop: &'a [f64],
+    first: usize,
+    weight_power: u32,
+    re: [f64; LANES],
+    im: [f64; LANES],
+    power: [f64; LANES],
+    moment: [f64; LANES],
+    energy: [f64; LANES],
+}
+
+impl<'a, const L: u32, const DROOP: bool> Weigh<'a, L, DROOP> {
+    fn new(droop: &'a [f64], first: usize) -> Self {
+        Self::with_power(droop, first, L)
+    }
+
+    fn with_power(droop: &'a [f64], first: usize, weight_power: u32) -> Self {
+        let zero = [0.0; LANES];
+        Self { droop, first, weight_power, re: zero, im: zero, power: zero, moment: zero, energy: zero }
+    }
+
+    fn sums(&self) -> Sums {
+        let total = |lanes: &[f64; LANES]| lanes.iter().sum::<f64>();
+        Sums {
+            cross: Complex::new(total(&self.re), total(&self.im)),
+            power: total(&self.power),
+            moment: total(&self.moment),
+            energy: if L == 2 { total(&self.power) } else { total(&self.energy) },
+        }
+    }
+}
+
+impl<const L: u32, const DROOP: bool> Sink for Weigh<'_, L, DROOP> {
+    #[inline(always)]
+    fn take<const W: usize>(&mut self, bins: &Bins<W>) {
+        for i in 0..W {
+            let (mut ir, mut ii) = (bins.target_re[i], bins.target_im[i]);
+            let (mut or, mut oi) = (bins.measured_re[i], bins.measured_im[i]);
+            if DROOP {
+                let inverse = 1.0 / self.droop[bins.first - self.first + i];
+                (ir, ii, or, oi) = (ir * inverse, ii * inverse, or * inverse, oi * inverse);
+            }
+            let squared = ir * ir + ii * ii;
+            let (mut re, mut im) = (or * ir + oi * ii, oi * ir - or * ii);
+            let mut power = squared;
+            if L != 2 {
+                power = weight(squared, self.weight_power);
+                // l = 1: O conj(I) / |I| goes to zero with I.
+                let factor = if squared > 0.0 { power / squared } else { 0.0 };
+                re *= factor;
+                im *= factor;
+                self.energy[i] += squared;
+            }
+            self.re[i] += re;
+            self.im[i] += im;
+            self.power[i] += power;
+            self.moment[i] += (bins.first + i) as f64 * power;
+        }
+    }
+}
+
+/// Keeps the bins.
+struct Collect {
+    first: usize,
+    target: Vec<Complex<f64>>,
+    measured: Vec<Complex<f64>>,
+}
+
+impl Sink for Collect {
+    fn take<const W: usize>(&mut self, bins: &Bins<W>) {
+        for i in 0..W {
+            let k = bins.first - self.first + i;
+            self.target[k] = Complex::new(bins.target_re[i], bins.target_im[i]);
+            self.measured[k] = Complex::new(bins.measured_re[i], bins.measured_im[i]);
+        }
+    }
+}
+
+/// Windows of one longer pair, evaluated one after the other.
+pub(crate) struct Moving<'a> {
+    evaluator: &'a Evaluator,
+    state: EvaluatorState,
+    pair: &'a Pair<'a>,
+}
+
+impl Evaluator {
+    /// Prepares to evaluate windows of `pair` that start at multiples of `hop`.
+    pub(crate) fn moving<'a>(&'a self, pair: &'a Pair<'a>, _hop: usize) -> Moving<'a> {
+        Moving { evaluator: self, state: self.state(), pair }
+    }
+}
+
+impl Moving<'_> {
+    /// The reading of the window that starts at sample `start`.
+    pub(crate) fn at(&mut self, start: usize) -> Result<Tracking> {
+        let range = start..start + self.evaluator.n_samples;
+        let window =
+            Pair::new(&self.pair.target()[range.clone()], &self.pair.measured()[range], self.pair.rate_hz())?;
+        self.evaluator.evaluate(&mut self.state, &window)
+    }
+}

@@ -1,0 +1,128 @@
+//! Windows and detrending, applied over the L samples of the record before zero-padding.
+
+use std::f64::consts::PI;
+
+/// Window over the record, symmetric (first and last sample alike).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Window {
+    /// No window: every sample counts alike.
+    #[default]
+    Boxcar,
+    /// 0.5 - 0.5 cos.
+    Hann,
+    /// 0.54 - 0.46 cos.
+    Hamming,
+    /// 0.42 - 0.5 cos + 0.08 cos 2.
+    Blackman,
+    /// The five-term flat-top window of scipy and MATLAB.
+    Flattop,
+    /// Flat with cosine ends, alpha = 0.5: a quarter of the record at either end.
+    Tukey,
+}
+
+impl Window {
+    /// All windows with their names.
+    pub const NAMES: [(&'static str, Window); 6] = [
+        ("boxcar", Window::Boxcar),
+        ("hann", Window::Hann),
+        ("hamming", Window::Hamming),
+        ("blackman", Window::Blackman),
+        ("flattop", Window::Flattop),
+        ("tukey", Window::Tukey),
+    ];
+
+    /// The window's `n` coefficients; `None` for boxcar, which multiplies by nothing.
+    ///
+    /// w_i = sum_m (-1)^m a_m cos(2 pi m i / (n - 1)), i = 0 .. n-1; tukey with alpha = 0.5 (Harris 1978).
+    pub fn coefficients(self, n: usize) -> Option<Vec<f64>> {
+        let terms: &[f64] = match self {
+            Window::Boxcar => return None,
+            Window::Hann => &[0.5, 0.5],
+            Window::Hamming => &[0.54, 0.46],
+            Window::Blackman => &[0.42, 0.5, 0.08],
+            Window::Flattop => &[0.21557895, 0.41663158, 0.277263158, 0.083578947, 0.006947368],
+            Window::Tukey => return Some(tukey(n)),
+        };
+        if n == 1 {
+            return Some(vec![1.0]);
+        }
+        let step = 2.0 * PI / (n - 1) as f64;
+        Some(
+            (0..n)
+                .map(|i| {
+                    // The nearer end is the origin, so that both halves are mirror images to the last bit.
+                    let x = step * i.min(n - 1 - i) as f64;
+                    terms.iter().enumerate().rev().fold(0.0, |sum, (m, a)| {
+                        let sign = if m % 2 == 0 { 1.0 } else { -1.0 };
+                        sum + sign * a * (m as f64 * x).cos()
+                    })
+                })
+                .collect(),
+        )
+    }
+}
+
+fn tukey(n: usize) -> Vec<f64> {
+    const ALPHA: f64 = 0.5;
+    let last = (n.max(2) - 1) as f64;
+    let width = (ALPHA * last / 2.0).floor() as usize;
+    (0..n)
+        .map(|i| {
+            let i = i.min(n - 1 - i);
+            if i <= width { 0.5 * (1.0 + (PI * (2.0 * i as f64 / ALPHA / last - 1.0)).cos()) } else { 1.0 }
+        })
+        .collect()
+}
+
+/// What is subtracted from the record before the window.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Detrend {
+    /// Nothing.
+    #[default]
+    None,
+    /// The mean.
+    Mean,
+    /// The least-squares line.
+    Linear,
+}
+
+impl Detrend {
+    /// All choices with their names.
+    pub const NAMES: [(&'static str, Detrend); 3] =
+        [("none", Detrend::None), ("mean", Detrend::Mean), ("linear", Detrend::Linear)];
+
+    /// The line `level + slope * (i - (n - 1) / 2)` to subtract from sample i; `None` where there is nothing to subtract.
+    pub fn line(self, samples: &[f64]) -> Option<Line> {
+        let n = samples.len() as f64;
+        let centre = (n - 1.0) / 2.0;
+        let level = match self {
+            Detrend::None => return None,
+            Detrend::Mean | Detrend::Linear => samples.iter().sum::<f64>() / n,
+        };
+        let slope = match self {
+            Detrend::Linear => {
+                let moment: f64 = samples.iter().enumerate().map(|(i, v)| (i as f64 - centre) * (v - level)).sum();
+                // sum (i - centre)^2 over 0 .. n-1
+                moment / (n * (n * n - 1.0) / 12.0)
+            }
+            _ => 0.0,
+        };
+        Some(Line { level, slope, centre })
+    }
+}
+
+/// A straight line over the sample index.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Line {
+    level: f64,
+    slope: f64,
+    centre: f64,
+}
+
+impl Line {
+    /// Value of the line at sample `i`.
+    #[inline(always)]
+    pub fn at(&self, i: usize) -> f64 {
+        self.level + self.slope * (i as f64 - self.centre)
+    }
+}

@@ -1,0 +1,38 @@
+//! One function from the core's errors to the exceptions of `rthstrack.errors`.
+
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::PyType;
+use rthstrack::Error;
+
+static SIGNAL_ERROR: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+static SETTING_ERROR: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+
+/// `SignalError` for what is wrong with the samples, `SettingError` for what is wrong with the settings.
+pub(crate) fn to_py(py: Python<'_>, error: &Error) -> PyErr {
+    let class = match error {
+        Error::Length { .. }
+        | Error::TooShort { .. }
+        | Error::NotFinite { .. }
+        | Error::ConstantTarget { .. }
+        | Error::Range { .. }
+        | Error::NoEnergy
+        | Error::TooShortForChebyshev { .. } => SIGNAL_ERROR.import(py, "rthstrack.errors", "SignalError"),
+        _ => setting_class(py),
+    };
+    class.map_or_else(|e| e, |class| PyErr::from_type(class.clone(), error.to_string()))
+}
+
+/// A `SettingError` for a name that is not one of the choices.
+pub(crate) fn choice<T: Copy>(py: Python<'_>, setting: &str, names: &[(&str, T)], found: &str) -> PyResult<T> {
+    if let Some((_, value)) = names.iter().find(|(name, _)| *name == found) {
+        return Ok(*value);
+    }
+    let known: Vec<&str> = names.iter().map(|(name, _)| *name).collect();
+    let message = format!("{setting} must be one of {}, not '{found}'", known.join(", "));
+    Err(setting_class(py).map_or_else(|e| e, |class| PyErr::from_type(class.clone(), message)))
+}
+
+fn setting_class(py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
+    SETTING_ERROR.import(py, "rthstrack.errors", "SettingError")
+}

@@ -1,0 +1,21 @@
+//! The binding: conversion only, one file per core module.
+
+use pyo3::prelude::*;
+
+mod error;
+mod indices;
+mod moving;
+mod response;
+mod signal;
+mod tracking;
+
+#[pymodule]
+fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    m.add_class::<tracking::Evaluator>()?;
+    m.add_function(wrap_pyfunction!(moving::evaluate_moving, m)?)?;
+    m.add_function(wrap_pyfunction!(response::frequency_response, m)?)?;
+    m.add_function(wrap_pyfunction!(indices::indices, m)?)?;
+    m.add_function(wrap_pyfunction!(indices::index_histories, m)?)?;
+    Ok(())
+}

@@ -1,0 +1,159 @@
+//! `Evaluator`: the plan, shared by threads; each call takes a state from the pool.
+
+use std::sync::Mutex;
+
+use num_complex::Complex;
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
+use pyo3::prelude::*;
+use rthstrack::{Decimator, Detrend, Estimator, EvaluatorConfig, EvaluatorState, Pair, Spectra, Tracking, Window};
+
+use crate::error::{choice, to_py};
+use crate::signal::Columns;
+
+/// amplitude, phase_rad, delay_s, equivalent_frequency_hz, fei
+pub(crate) type Numbers = (f64, f64, f64, f64, Complex<f64>);
+/// frequency_hz, weights, target_spectrum, measured_spectrum
+type SpectraArrays<'py> = (
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<Complex<f64>>>,
+    Bound<'py, PyArray1<Complex<f64>>>,
+);
+
+pub(crate) fn numbers(t: &Tracking) -> Numbers {
+    (t.amplitude, t.phase_rad, t.delay_s, t.equivalent_frequency_hz, t.fei)
+}
+
+/// The names of the settings to the core's own.
+pub(crate) fn config(
+    py: Python<'_>,
+    estimator: &str,
+    data_decimation: usize,
+    frequency_decimation: usize,
+    decimator: &str,
+    weight_power: u32,
+    window: &str,
+    detrend: &str,
+    band_hz: Option<(f64, f64)>,
+) -> PyResult<EvaluatorConfig> {
+    Ok(EvaluatorConfig {
+        estimator: choice(py, "estimator", &Estimator::NAMES, estimator)?,
+        data_decimation,
+        frequency_decimation,
+        decimator: choice(py, "decimator", &Decimator::NAMES, decimator)?,
+        weight_power,
+        window: choice(py, "window", &Window::NAMES, window)?,
+        detrend: choice(py, "detrend", &Detrend::NAMES, detrend)?,
+        band_hz,
+    })
+}
+
+/// The checked plan for records of one length and rate.
+#[pyclass(frozen, module = "rthstrack._core")]
+pub(crate) struct Evaluator {
+    plan: rthstrack::Evaluator,
+    states: Mutex<Vec<EvaluatorState>>,
+}
+
+#[pymethods]
+impl Evaluator {
+    #[new]
+    #[pyo3(signature = (n_samples, rate_hz, estimator, data_decimation, frequency_decimation, decimator, weight_power, window, detrend, band_hz))]
+    fn new(
+        py: Python<'_>,
+        n_samples: usize,
+        rate_hz: f64,
+        estimator: &str,
+        data_decimation: usize,
+        frequency_decimation: usize,
+        decimator: &str,
+        weight_power: u32,
+        window: &str,
+        detrend: &str,
+        band_hz: Option<(f64, f64)>,
+    ) -> PyResult<Self> {
+        let config = config(
+            py,
+            estimator,
+            data_decimation,
+            frequency_decimation,
+            decimator,
+            weight_power,
+            window,
+            detrend,
+            band_hz,
+        )?;
+        let plan = rthstrack::Evaluator::new(n_samples, rate_hz, config).map_err(|e| to_py(py, &e))?;
+        Ok(Self { plan, states: Mutex::default() })
+    }
+
+    #[getter]
+    fn n_bins(&self) -> usize {
+        self.plan.n_bins()
+    }
+
+    #[getter]
+    fn delta_f_hz(&self) -> f64 {
+        self.plan.delta_f_hz()
+    }
+
+    /// One tuple of numbers an actuator.
+    fn evaluate(
+        &self,
+        py: Python<'_>,
+        target: PyReadonlyArrayDyn<'_, f64>,
+        measured: PyReadonlyArrayDyn<'_, f64>,
+    ) -> PyResult<Vec<Numbers>> {
+        let found = self.each(py, &target, &measured, |state, pair| self.plan.evaluate(state, pair))?;
+        Ok(found.iter().map(numbers).collect())
+    }
+
+    /// One tuple of numbers and one of arrays an actuator.
+    fn evaluate_with_spectra<'py>(
+        &self,
+        py: Python<'py>,
+        target: PyReadonlyArrayDyn<'py, f64>,
+        measured: PyReadonlyArrayDyn<'py, f64>,
+    ) -> PyResult<Vec<(Numbers, SpectraArrays<'py>)>> {
+        let found = self.each(py, &target, &measured, |state, pair| self.plan.evaluate_with_spectra(state, pair))?;
+        Ok(found
+            .into_iter()
+            .map(|(tracking, Spectra { frequency_hz, weights, target, measured })| {
+                let arrays = (
+                    frequency_hz.into_pyarray(py),
+                    weights.into_pyarray(py),
+                    target.into_pyarray(py),
+                    measured.into_pyarray(py),
+                );
+                (numbers(&tracking), arrays)
+            })
+            .collect())
+    }
+}
+
+impl Evaluator {
+    /// Runs `call` on each actuator's pair, without the interpreter's lock.
+    fn each<T: Send>(
+        &self,
+        py: Python<'_>,
+        target: &PyReadonlyArrayDyn<'_, f64>,
+        measured: &PyReadonlyArrayDyn<'_, f64>,
+        call: impl Fn(&mut EvaluatorState, &Pair<'_>) -> rthstrack::Result<T> + Sync,
+    ) -> PyResult<Vec<T>> {
+        let (target, measured) = (Columns::new(target)?, Columns::new(measured)?);
+        let results = py.detach(|| {
+            let mut state = self.lock().pop().unwrap_or_else(|| self.plan.state());
+            let results: rthstrack::Result<Vec<T>> = (0..target.len())
+                .map(|a| call(&mut state, &Pair::new(target.at(a), measured.at(a), self.plan.rate_hz())?))
+                .collect();
+            self.lock().push(state);
+            results
+        });
+        results.map_err(|e| to_py(py, &e))
+    }
+
+    /// A state holds nothing between calls, so one left by a panic is as good as new.
+    fn lock(&self) -> std::sync::MutexGuard<'_, Vec<EvaluatorState>> {
+        self.states.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+}

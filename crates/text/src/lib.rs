@@ -1,0 +1,68 @@
+//! Reads the delimited text that laboratory data acquisition writes: bytes in, named columns out.
+//!
+//! Nothing has to be said about the file. Encoding (UTF-8, UTF-16, Latin-1), line ends, delimiter, decimal mark, the
+//! end of the preamble, the row of names and the row of units are found from the content:
+//!
+//! ```
+//! let table = rthstrack_text::read(b"Sampling Rate: 1000\nTime;Disp\ns;mm\n0,000;1,5\n0,001;2,5\n")?;
+//! assert_eq!(table.preamble[0], "Sampling Rate: 1000");
+//! assert_eq!(table.columns[1].name.as_deref(), Some("Disp"));
+//! assert_eq!(table.columns[1].unit.as_deref(), Some("mm"));
+//! assert_eq!(table.columns[1].values, rthstrack_text::Values::Numbers(vec![1.5, 2.5]));
+//! # Ok::<(), rthstrack_text::TextError>(())
+//! ```
+//!
+//! Every row counts: a ragged row or a word among numbers is an error with its line, never left out. Every number has
+//! exactly the value that `str::parse::<f64>` gives its token. No input makes this crate panic.
+
+mod dialect;
+mod encoding;
+mod error;
+mod header;
+mod line;
+mod number;
+mod stamp;
+mod table;
+
+pub use encoding::Encoding;
+pub use error::TextError;
+pub use table::{Column, MISSING_STAMP, Table, Values, read};
+
+/// What stands between two fields of a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Delimiter {
+    /// A tab.
+    Tab,
+    /// A semicolon.
+    Semicolon,
+    /// A comma.
+    Comma,
+    /// A vertical bar.
+    Bar,
+    /// Any number of blanks and tabs.
+    Blanks,
+}
+
+impl Delimiter {
+    /// The word for it in messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tab => "tab",
+            Self::Semicolon => "semicolon",
+            Self::Comma => "comma",
+            Self::Bar => "'|'",
+            Self::Blanks => "blanks",
+        }
+    }
+
+    #[inline]
+    fn is(self, byte: u8) -> bool {
+        match self {
+            Self::Tab => byte == b'\t',
+            Self::Semicolon => byte == b';',
+            Self::Comma => byte == b',',
+            Self::Bar => byte == b'|',
+            Self::Blanks => byte == b' ' || byte == b'\t',
+        }
+    }
+}

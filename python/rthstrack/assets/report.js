@@ -1,0 +1,243 @@
+"use strict";
+/* The report's page: tabs, and the charts of the tab that is shown. All numbers come from the program that wrote it. */
+(() => {
+  const drawing = JSON.parse(document.getElementById("drawing").textContent);
+  const decoded = new Map();
+
+  /* A column is {block, type, offset}: little-endian samples in base64, the offset taken off before rounding. */
+  function column(spec) {
+    if (!spec) return null;
+    if (!decoded.has(spec.block)) {
+      const text = atob(document.getElementById(spec.block).textContent.trim());
+      const bytes = new Uint8Array(text.length);
+      for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
+      const raw = new { f4: Float32Array, f8: Float64Array, u4: Uint32Array }[spec.type](bytes.buffer);
+      decoded.set(spec.block, spec.type === "u4" ? raw : Float64Array.from(raw, (v) => v + spec.offset));
+    }
+    return decoded.get(spec.block);
+  }
+
+  /* NaN is a gap; on a logarithmic axis so is zero. */
+  const gaps = (values, factor = 1) => Array.from(values, (v) => (Number.isFinite(v) ? v * factor : null));
+  const positive = (values) => Array.from(values, (v) => (v > 0 ? v : null));
+  const where = (values, mask) => Array.from(values, (v, i) => (mask[i] && Number.isFinite(v) ? v : null));
+
+  /* Times of samples 0, 1, 2, ... or of those that `index` names. */
+  function times({ start, step, n, index }) {
+    const kept = column(index);
+    return kept ? Float64Array.from(kept, (i) => start + i * step) : Float64Array.from({ length: n }, (_, i) => start + i * step);
+  }
+
+  function firstAtLeast(sorted, value) {
+    let [low, high] = [0, sorted.length];
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (sorted[middle] < value) low = middle + 1;
+      else high = middle;
+    }
+    return low;
+  }
+
+  function buttons(panel, name, linked, views) {
+    const bar = panel.querySelector(`[data-views="${name}"]`);
+    if (!bar) return;
+    for (const [label, range] of views) {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.textContent = label;
+      button.addEventListener("click", () => linked.set(...range()));
+      bar.append(button);
+    }
+  }
+
+  function limitPair(limit, around, format) {
+    if (limit == null) return [];
+    return [around + limit, around - limit].map((value) => ({ value, label: `limit ${format(value)}` }));
+  }
+
+  function drawTime(panel, a, host) {
+    const t = a.time;
+    const x = times(t);
+    const [target, measured] = [column(t.target), column(t.measured)];
+    const error = measured.map((v, i) => v - target[i]);
+    const linked = Charts.group({ extent: [t.start, t.start + (t.n - 1) * t.step], smallest: 4 * t.step });
+    const axis = { label: "Time (s)", name: "t", unit: "s", group: linked };
+    buttons(panel, "time", linked, [
+      ["Whole record", () => linked.extent],
+      ...(t.strongest ? [[t.strongest_label, () => t.strongest]] : []),
+    ]);
+    Charts.lines(host("history"), {
+      x: axis, y: { label: t.label, unit: a.unit }, height: 250, data: [x, target, measured],
+      series: [{ label: t.target_label, colour: "target" }, { label: t.measured_label, colour: "measured" }],
+    });
+    Charts.lines(host("error"), {
+      x: axis, y: { label: t.error_label, unit: a.unit }, height: 170, data: [x, error],
+      references: [{ value: 0 }], series: [{ label: t.error_name, colour: "error" }],
+    });
+    const loop = Charts.loop(host("loop"), {
+      x: { label: t.x_label }, y: { label: t.y_label }, data: [target, measured], colour: "value", size: 500,
+    });
+    let waiting = false;
+    linked.onChange(() => {
+      if (waiting) return;
+      waiting = true;
+      requestAnimationFrame(() => {
+        waiting = false;
+        const [from, to] = [firstAtLeast(x, linked.min), firstAtLeast(x, linked.max + t.step / 2)];
+        loop.setData(target.subarray(from, to), measured.subarray(from, to));
+      });
+    });
+    return axis;
+  }
+
+  function drawMoving(a, host, axis) {
+    const m = a.moving;
+    if (!m) return;
+    const x = column(m.time);
+    const shades = m.invalid.map(([from, to]) => ({ from, to }));
+    Charts.lines(host("moving-amplitude"), {
+      x: axis, y: { label: "Amplitude A (-)" }, height: 190, shades, data: [x, gaps(column(m.amplitude))],
+      references: [{ value: 1 }, { value: a.amplitude, label: "whole record" }],
+      limits: limitPair(a.limits.amplitude, 1, (v) => Charts.number(v)),
+      series: [{ label: "A", colour: "value", width: 1.5 }],
+    });
+    Charts.lines(host("moving-delay"), {
+      x: axis, y: { label: "Delay d (ms)", unit: "ms" }, height: 190, shades,
+      data: [x, gaps(column(m.delay_s), 1e3)],
+      references: [{ value: 0 }, { value: a.delay_s * 1e3, label: "whole record" }],
+      limits: limitPair(a.limits.delay_s == null ? null : a.limits.delay_s * 1e3, 0, (v) => `${Charts.number(v)} ms`),
+      series: [{ label: "d", colour: "value", width: 1.5 }],
+    });
+  }
+
+  function drawHistories(a, host, axis) {
+    const h = a.histories;
+    const x = times(h);
+    const squared = a.unit ? `${a.unit}²` : "";
+    Charts.lines(host("running-errors"), {
+      x: axis, y: { label: h.error_label, unit: a.unit, zero: true }, height: 170,
+      data: [x, gaps(column(h.max_tracking_error)), gaps(column(h.rms_error))],
+      series: [{ label: "maximum so far (MTE)", colour: "error" }, { label: "RMS so far", colour: "third", width: 1.5 }],
+    });
+    Charts.lines(host("indicator"), {
+      x: axis, y: { label: h.indicator_label, unit: squared }, height: 170,
+      data: [x, gaps(column(h.tracking_indicator))],
+      references: [{ value: 0 }], series: [{ label: "TI", colour: "second", width: 1.5 }],
+    });
+    if (h.energy_error) {
+      Charts.lines(host("energy"), {
+        x: axis, y: { label: "Energy error" }, height: 170, data: [x, gaps(column(h.energy_error))],
+        references: [{ value: 0 }], series: [{ label: "energy error", colour: "second", width: 1.5 }],
+      });
+    }
+  }
+
+  function drawFrequencies(panel, a, host) {
+    const f = a.frequency;
+    if (!f) return;
+    const linked = Charts.group({ extent: f.extent, home: f.home, log: true });
+    const axis = { label: "Frequency (Hz)", name: "f", unit: "Hz", group: linked };
+    const marks = Number.isFinite(a.equivalent_frequency_hz) && a.equivalent_frequency_hz !== null
+      ? [{ at: a.equivalent_frequency_hz, label: `f_eq ${Charts.number(a.equivalent_frequency_hz, 3)} Hz` }] : [];
+    const bare = marks.map(({ at }) => ({ at }));
+    const shades = f.outside.map(([from, to]) => ({ from, to }));
+    buttons(panel, "frequency", linked, [
+      ["Where the target moves", () => f.home], ["All frequencies", () => f.extent],
+    ]);
+    const s = a.spectrum;
+    if (s) {
+      const x = column(s.frequency);
+      Charts.lines(host("spectra"), {
+        x: axis, y: { label: s.label, unit: s.unit, log: true, decades: 6 }, height: 240, marks, shades,
+        data: [x, positive(column(s.target)), positive(column(s.measured))],
+        series: [{ label: a.time.target_label, colour: "target" }, { label: a.time.measured_label, colour: "measured" }],
+      });
+      Charts.lines(host("weights"), {
+        x: axis, y: { label: "Weight of a bin (-)", zero: true }, height: 240, marks: bare, shades,
+        data: [x, gaps(column(s.weights))], series: [{ label: "weight w", colour: "second", width: 1.5 }],
+      });
+    }
+    const r = a.response;
+    if (!r) return;
+    const x = column(r.frequency);
+    const coherence = column(r.coherence);
+    const sure = coherence.map((c) => (c >= r.low_coherence ? 1 : 0));
+    const any = sure.some((v) => v);
+    const curve = (name, label, unit, values, references, limits) => Charts.lines(host(name), {
+      x: axis, y: { label, unit }, height: 210, marks: bare, shades, references, limits,
+      data: [x, gaps(values), where(values, sure)],
+      series: [
+        { label: name, colour: "doubtful", auto: !any },
+        { label: name, colour: "value", width: 1.75, silent: true },
+      ],
+    });
+    curve("gain", "Gain (-)", "", column(r.gain),
+      [{ value: 1 }, { value: a.amplitude, label: "A" }], limitPair(a.limits.amplitude, 1, (v) => Charts.number(v)));
+    curve("delay", "Delay (ms)", "ms", column(r.delay_s).map((d) => d * 1e3),
+      [{ value: 0 }, { value: a.delay_s * 1e3, label: "d" }],
+      limitPair(a.limits.delay_s == null ? null : a.limits.delay_s * 1e3, 0, (v) => `${Charts.number(v)} ms`));
+    Charts.lines(host("coherence"), {
+      x: axis, y: { label: "Coherence (-)", fixed: [0, 1.05] }, height: 150, marks: bare, shades,
+      references: [{ value: r.low_coherence, label: `${r.low_coherence}` }],
+      data: [x, gaps(coherence), where(coherence, sure)],
+      series: [
+        { label: "coherence", colour: "doubtful" },
+        { label: "coherence", colour: "value", width: 1.75, silent: true },
+      ],
+    });
+  }
+
+  const drawn = new Set();
+  function draw(number) {
+    if (drawn.has(number)) return;
+    drawn.add(number);
+    const panel = document.getElementById(`assessment-${number}`);
+    const host = (name) => panel.querySelector(`[data-chart="${name}"]`);
+    const a = drawing[number];
+    const axis = drawTime(panel, a, host);
+    drawMoving(a, host, axis);
+    drawHistories(a, host, axis);
+    drawFrequencies(panel, a, host);
+    panel.dataset.drawn = "true";
+  }
+
+  // ------------------------------------------------------------------------------------------------ tabs
+
+  const tabs = [...document.querySelectorAll('[role="tab"]')];
+  const panels = [...document.querySelectorAll(".assessment")];
+
+  function select(number, focus) {
+    panels.forEach((panel, i) => { panel.hidden = i !== number; });
+    tabs.forEach((tab, i) => {
+      tab.setAttribute("aria-selected", String(i === number));
+      tab.tabIndex = i === number ? 0 : -1;
+    });
+    document.querySelectorAll("[data-assessment]").forEach((row) => {
+      row.classList.toggle("shown", Number(row.dataset.assessment) === number);
+    });
+    if (tabs[number]) {
+      if (focus) tabs[number].focus();
+      tabs[number].scrollIntoView({ block: "nearest", inline: "nearest" });
+    }
+    draw(number);
+  }
+
+  tabs.forEach((tab, i) => {
+    tab.addEventListener("click", () => select(i, true));
+    tab.addEventListener("keydown", (event) => {
+      const to = { ArrowRight: i + 1, ArrowDown: i + 1, ArrowLeft: i - 1, ArrowUp: i - 1, Home: 0, End: tabs.length - 1 }[event.key];
+      if (to === undefined) return;
+      event.preventDefault();
+      select((to + tabs.length) % tabs.length, true);
+    });
+  });
+
+  function fromAddress() {
+    const asked = /^#assessment-(\d+)$/.exec(location.hash);
+    const number = asked ? Number(asked[1]) : 0;
+    return number < panels.length ? number : 0;
+  }
+  addEventListener("hashchange", () => select(fromAddress(), false));
+  select(fromAddress(), false);
+  document.documentElement.dataset.ready = "true";
+})();

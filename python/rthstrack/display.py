@@ -1,0 +1,115 @@
+"""What the report and the figures share: which points to draw, how to write a number, what a signal is called.
+
+Nothing here changes a result; every function only chooses how a result is shown.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from rthstrack.tracking import Tracking
+
+#: Gain and delay are drawn grey where the coherence is below this.
+LOW_COHERENCE = 0.8
+
+#: The part of a record that is shown enlarged, in seconds.
+STRONGEST_S = 4.0
+
+_ROLES = {"whole": ("target", "measured"), "compensator": ("target", "command"), "actuator": ("command", "measured")}
+_LENGTHS = {"m", "cm", "mm", "um", "µm", "μm", "in", "inch", "inches", "ft"}
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def signal_roles(part: str) -> tuple[str, str]:
+    """What the two signals of a part are called, for example ("target", "command") for the compensator."""
+    return _ROLES.get(part, ("target", "measured"))
+
+
+def quantity(unit: str | None) -> str:
+    """The quantity that a unit measures, as far as it tells: "Displacement" for a length, else "Signal"."""
+    return "Displacement" if unit is not None and unit.strip().lower() in _LENGTHS else "Signal"
+
+
+def with_unit(name: str, unit: str | None) -> str:
+    """An axis label, "Displacement (mm)"; it says so where the unit is not stated."""
+    return f"{name} ({unit if unit else 'unit not stated'})"
+
+
+def significant(value: float, digits: int = 4) -> str:
+    """A number with so many significant digits: 0.7170, 13.51, 1.234×10⁻⁵; whole numbers stay whole."""
+    if isinstance(value, int | np.integer):
+        return str(int(value))
+    if value == 0:
+        return "0"
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    power = int(exponent)
+    if -4 <= power < 6:
+        return f"{value:.{max(digits - 1 - power, 0)}f}".replace("-", "\N{MINUS SIGN}")
+    mantissa = mantissa.replace("-", "\N{MINUS SIGN}")
+    return f"{mantissa}\N{MULTIPLICATION SIGN}10{str(power).translate(_SUPERSCRIPTS)}"
+
+
+def fourier_scale(tracking: Tracking) -> float:
+    """Factor from the plain DFT to the Fourier amplitude in unit*s: the time between the samples transformed."""
+    settings = tracking.settings
+    step = settings.data_decimation if settings.decimator == "chebyshev" else 1
+    return step / tracking.rate_hz
+
+
+def strongest_span(target: NDArray[np.float64], rate_hz: float, span_s: float = STRONGEST_S) -> tuple[int, int]:
+    """First and one-past-last sample of the `span_s` seconds in which the target moves most (mean removed)."""
+    n = round(span_s * rate_hz)
+    if n < 1 or n >= target.size:
+        return 0, target.size
+    energy = np.concatenate(([0.0], np.cumsum((target - target.mean()) ** 2)))
+    first = int(np.argmax(energy[n:] - energy[:-n]))
+    return first, first + n
+
+
+def judged_range(tracking: Tracking) -> tuple[float, float] | None:
+    """Frequencies (Hz) to show first: those with 99.9 % of the weight and some room on both sides."""
+    if tracking.frequency_hz is None or tracking.weights is None or tracking.frequency_hz.size < 2:
+        return None
+    frequency = tracking.frequency_hz
+    share = np.cumsum(tracking.weights)
+    last = frequency.size - 1
+    low = frequency[min(int(np.searchsorted(share, 0.0005)), last)] / 2
+    high = frequency[min(int(np.searchsorted(share, 0.9995)), last)] * 3
+    return float(max(low, frequency[0])), float(min(high, frequency[-1]))
+
+
+def even_edges(n: int, n_groups: int) -> NDArray[np.intp]:
+    """Edges of `n_groups` groups of nearly the same number of points."""
+    return np.unique(np.linspace(0, n, n_groups + 1).round().astype(np.intp))
+
+
+def log_edges(n: int, n_groups: int) -> NDArray[np.intp]:
+    """Edges of groups that are about equally wide on a logarithmic axis of the index."""
+    return np.unique(np.concatenate(([0], np.geomspace(1, n, n_groups).round())).astype(np.intp))
+
+
+def extremes(columns: Sequence[NDArray[np.floating]], edges: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Indices of the points to draw: both ends, and in every group each column's minimum and maximum.
+
+    A group with NaN keeps the first of them too, so that a gap stays a gap.
+    """
+    keep = {0, int(edges[-1]) - 1}
+    for column in columns:
+        missing = np.isnan(column)
+        low = np.where(missing, np.inf, column)
+        high = np.where(missing, -np.inf, column)
+        gaps = bool(missing.any())
+        for first, end in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+            keep.add(first + int(low[first:end].argmin()))
+            keep.add(first + int(high[first:end].argmax()))
+            if gaps and math.isnan(column[first:end].sum()):
+                keep.add(first + int(missing[first:end].argmax()))
+    return np.array(sorted(keep), dtype=np.intp)

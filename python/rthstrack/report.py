@@ -1,0 +1,819 @@
+"""One self-contained HTML page from one or several assessments.
+
+The page takes what an `Assessment` holds and computes nothing. It loads nothing from a network: style, scripts and
+samples are inside, and a content security policy forbids anything else. Texts from files are escaped everywhere.
+"""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import hashlib
+import json
+import math
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from html import escape
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rthstrack import display
+from rthstrack._core import __version__
+from rthstrack.errors import SettingError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rthstrack.assessment import Assessment
+
+#: More samples than this are drawn by their extremes.
+DRAWN_SAMPLES = 200_000
+#: More points of a curve (spectrum, history, moving evaluation) than this are drawn by their extremes.
+DRAWN_POINTS = 6_000
+
+NOT_DETERMINED = "not determined"
+
+_INDICES = (
+    # field, name, unit ("unit" stands for the signals' own), factor to the unit shown, what it is
+    ("max_tracking_error", "MTE", "unit", 1.0, "largest |{measured} \N{MINUS SIGN} {target}|"),
+    ("max_tracking_error_percent", "MTE, relative", "%", 1.0, "of the largest |{target}|"),
+    ("rms_error", "RMS error", "unit", 1.0, "root mean square of {measured} \N{MINUS SIGN} {target}"),
+    ("rms_error_percent", "RMS error, relative", "%", 1.0, "of the RMS of {target}"),
+    ("tracking_indicator", "TI", "unit2", 1.0, "tracking indicator at the end; rises on lag, falls on lead"),
+    ("j1_s", "J1", "ms", 1e3, "lag of the correlation peak; positive: {measured} lags"),
+    ("j2_percent", "J2", "%", 1.0, "standard deviation of the error over that of {target}"),
+    ("j3_percent", "J3", "%", 1.0, "peak error over peak {target}"),
+    (
+        "energy_error",
+        "Energy error",
+        "",
+        1.0,
+        "work over {measured} less work over {target}",
+    ),
+)
+
+_SETTING_NAMES = {
+    "estimator": "Estimator",
+    "data_decimation": "Data decimation P",
+    "frequency_decimation": "Frequency decimation Q",
+    "decimator": "Decimator",
+    "weight_power": "Weight power l",
+    "window": "Window",
+    "detrend": "Detrend",
+    "band_hz": "Band",
+    "rate_hz": "Rate",
+}
+
+
+def write_report(assessments: Sequence[Assessment], path: str | Path) -> None:
+    """Write the HTML report of one or several assessments to `path`.
+
+    Above 200,000 samples a trace is drawn by the extremes of groups of samples, and the page says so; its numbers are
+    the assessment's own. Errors: SettingError without an assessment, or where the file cannot be written.
+    """
+    page = report_html(assessments)
+    try:
+        Path(path).write_text(page, encoding="utf-8", errors="replace", newline="\n")
+    except OSError as error:
+        raise SettingError(
+            f"{path}: cannot write the report there ({error.strerror}); name a file in an existing, writable folder"
+        ) from error
+
+
+def report_html(assessments: Sequence[Assessment]) -> str:
+    """The text of the page that `write_report` writes."""
+    if not assessments:
+        raise SettingError("a report needs at least one assessment, none was given; evaluate a recording first")
+    blocks = _Blocks()
+    drawing = [_drawing(assessment, blocks) for assessment in assessments]
+    version, created = __version__, datetime.now().astimezone()
+    results = {
+        "program": {"name": "rthstrack", "version": version},
+        "created": created.isoformat(timespec="seconds"),
+        "results": [result_record(assessment) for assessment in assessments],
+    }
+    style = "\n".join(_asset(name) for name in ("uPlot.min.css", "charts.css", "report.css"))
+    licence = f"/*! uPlot 1.6.32\n{_asset('uPlot.LICENSE').strip()}\n*/\n"
+    scripts = [licence + _asset("uPlot.iife.min.js"), _asset("charts.js"), _asset("report.js")]
+    policy = (
+        f"default-src 'none'; img-src data:; style-src {_digest(style)}; "
+        f"script-src {' '.join(_digest(script) for script in scripts)}; base-uri 'none'; form-action 'none'"
+    )
+    several = len(assessments) > 1
+    n_files = len({assessment.file for assessment in assessments})
+    title = (
+        f"Tracking of {len(assessments)} pairs in {n_files} {'file' if n_files == 1 else 'files'}"
+        if several
+        else f"Tracking in {assessments[0].file}"
+    )
+    parts = [
+        "<!DOCTYPE html>",
+        '<html lang="en">',
+        "<head>",
+        '<meta charset="utf-8">',
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        '<meta name="color-scheme" content="light dark">',
+        f'<meta name="generator" content="rthstrack {escape(version)}">',
+        f"<title>{escape(title)}</title>",
+        '<link rel="icon" href="data:,">',
+        f"<style>{style}</style>",
+        "</head>",
+        "<body>",
+        '<header class="page">',
+        f"<h1>{escape(title)}</h1>",
+        f'<p class="muted">rthstrack {escape(version)} · '
+        f'<time datetime="{results["created"]}">{created:%Y-%m-%d %H:%M}</time></p>',
+        "</header>",
+        "<main>",
+        "<noscript><p>The numbers below are complete; the charts need JavaScript.</p></noscript>",
+    ]
+    if several:
+        parts += [_summary(assessments), _tabs(assessments)]
+    for number, (assessment, drawn) in enumerate(zip(assessments, drawing, strict=True)):
+        role = f' role="tabpanel" aria-labelledby="tab-{number}"' if several else ""
+        opening = f'<section class="assessment" id="assessment-{number}"{role}>'
+        parts.append(_section(assessment, drawn, opening, version, created))
+    parts += [
+        "</main>",
+        _footer(),
+        _json_block("results", results),
+        _json_block("drawing", drawing),
+        blocks.html(),
+        *(f"<script>{script}</script>" for script in scripts),
+        "</body>",
+        "</html>",
+        "",
+    ]
+    return "\n".join(parts)
+
+
+def result_record(assessment: Assessment) -> dict[str, Any]:
+    """The numbers of one assessment at full precision, ready for JSON; a number that is not determined is None."""
+    a, tracking = assessment, assessment.tracking
+    record: dict[str, Any] = {
+        "file": a.file,
+        "actuator": a.actuator,
+        "part": a.part,
+        "target": a.target_name,
+        "measured": a.measured_name,
+        "unit": a.unit,
+        "rate_hz": a.rate_hz,
+        "start_s": a.start_s,
+        "n_samples": int(a.target.size),
+        "amplitude": tracking.amplitude,
+        "delay_s": tracking.delay_s,
+        "phase_rad": tracking.phase_rad,
+        "equivalent_frequency_hz": tracking.equivalent_frequency_hz,
+        "n_bins": tracking.n_bins,
+        "delta_f_hz": tracking.delta_f_hz,
+        "settings": {**dataclasses.asdict(tracking.settings), **a.settings},
+        "indices": dataclasses.asdict(a.indices),
+        "moving": None,
+        "response": None,
+        "verdict": a.verdict,
+        "warnings": a.warnings,
+        "limits": dataclasses.asdict(a.limits),
+        "exceeded": a.exceeded,
+        "not_determined": _reasons(a),
+    }
+    if a.moving is not None:
+        record["moving"] = {
+            "window_s": a.moving.window_s,
+            "hop_s": a.moving.hop_s,
+            "minimum_std_ratio": a.moving.minimum_std_ratio,
+            "n_readings": int(a.moving.time_s.size),
+            "n_valid": int(np.count_nonzero(a.moving.valid)),
+        }
+    if a.response is not None:
+        names = ("segment_s", "overlap", "n_segments", "window", "detrend")
+        record["response"] = {name: getattr(a.response, name) for name in names}
+    plain = _plain(record)
+    assert isinstance(plain, dict)
+    return plain
+
+
+# ---------------------------------------------------------------------------------------------------- numbers and texts
+
+
+def _reasons(a: Assessment) -> dict[str, str]:
+    reasons: dict[str, str] = {}
+    for name in ("amplitude", "delay_s", "phase_rad", "equivalent_frequency_hz"):
+        if not math.isfinite(getattr(a.tracking, name)):
+            reasons[name] = "the evaluation gave no finite number"
+    for index in dataclasses.fields(a.indices):
+        value = getattr(a.indices, index.name)
+        if value is None:
+            needs_force = index.name == "energy_error"
+            reasons[index.name] = "needs the measured force" if needs_force else "was not evaluated"
+        elif not math.isfinite(value):
+            reasons[index.name] = "the evaluation gave no finite number"
+    if a.moving is None:
+        reasons["moving"] = a.moving_note or "was not evaluated"
+    if a.response is None:
+        reasons["response"] = a.response_note or "was not evaluated"
+    return reasons
+
+
+def _plain(value: Any) -> Any:
+    """The value in types that JSON knows; NaN and infinities become None."""
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    if isinstance(value, int | np.integer):
+        return int(value)
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else None
+    if isinstance(value, complex | np.complexfloating):
+        return [_plain(value.real), _plain(value.imag)]
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value if value is None or isinstance(value, str) else str(value)
+
+
+def _number(
+    field: str, value: float | None, unit: str = "", factor: float = 1.0, reason: str | None = None, digits: int = 4
+) -> str:
+    """A number as text with its unit; the machine-readable value beside it is in the unit of the field's name."""
+    if value is None or not math.isfinite(value):
+        why = f" ({escape(reason)})" if reason else ""
+        return f'<span class="muted" data-field="{field}">{NOT_DETERMINED}{why}</span>'
+    shown = display.significant(value if isinstance(value, int) else float(value) * factor, digits)
+    tail = f'<span class="unit">{"" if unit == "°" else " "}{escape(unit)}</span>' if unit else ""
+    exact = value if isinstance(value, int) else repr(float(value))
+    return f'<data data-field="{field}" value="{exact}">{shown}{tail}</data>'
+
+
+def _flat(settings: Mapping[str, Any], before: str = "") -> list[tuple[str, Any]]:
+    rows: list[tuple[str, Any]] = []
+    for key, value in settings.items():
+        name = f"{before}{key}"
+        if isinstance(value, Mapping):
+            rows += _flat(value, f"{name} · ") if value else [(name, None)]
+        else:
+            rows.append((name, value))
+    return rows
+
+
+def _setting(name: str, value: Any) -> tuple[str, str]:
+    """A setting's name and value in words; the unit is the suffix of the name."""
+    unit = next((u for end, u in (("_hz", "Hz"), ("_s", "s"), ("_percent", "%")) if name.endswith(end)), "")
+    plain = name.removesuffix("_hz").removesuffix("_percent")
+    plain = plain.removesuffix("_s").replace("_", " ")
+    label = _SETTING_NAMES.get(name, plain[:1].upper() + plain[1:])
+    if value is None or value == [] or value == ():
+        return label, "none"
+    if isinstance(value, bool):
+        return label, "yes" if value else "no"
+    if isinstance(value, list | tuple):
+        text = (" to " if len(value) == 2 and unit else ", ").join(_scalar(item) for item in value)
+    else:
+        text = _scalar(value)
+    return label, f"{text} {unit}" if unit else text
+
+
+def _scalar(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float | np.floating) else str(value)
+
+
+def _asset(name: str) -> str:
+    return (resources.files("rthstrack") / "assets" / name).read_text(encoding="utf-8")
+
+
+def _digest(text: str) -> str:
+    """The text's hash as a content security policy names it."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+def _json_block(name: str, content: Any) -> str:
+    """A JSON script block. With every < written as an escape, no text in it can end the block or open another."""
+    text = json.dumps(content, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    return f'<script type="application/json" id="{name}">{text.replace("<", chr(92) + "u003c")}</script>'
+
+
+# ---------------------------------------------------------------------------------------------------- what is drawn
+
+
+class _Blocks:
+    """The columns of samples on the page, each once: a channel shared by several assessments is stored once."""
+
+    def __init__(self) -> None:
+        self._texts: dict[str, str] = {}
+
+    def column(self, values: NDArray[Any]) -> dict[str, Any]:
+        """Store a column. Single precision of the distance from mid-range: 6e-8 of the range, whatever the offset."""
+        if values.dtype.kind in "iu":
+            return self._store(values.astype("<u4"), "u4", 0.0)
+        finite = values[np.isfinite(values)]
+        low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
+        # Only a true offset is worth it: taken off a spectrum it would round the small values away.
+        offset = (low + high) / 2 if high - low < max(abs(low), abs(high)) else 0.0
+        if 1e-30 < high - low < 1e30:
+            return self._store((values - offset).astype("<f4"), "f4", offset)
+        return self._store(values.astype("<f8"), "f8", 0.0)
+
+    def _store(self, values: NDArray[Any], kind: str, offset: float) -> dict[str, Any]:
+        raw = values.tobytes()
+        key = f"block-{hashlib.sha256(repr((kind, offset)).encode() + raw).hexdigest()[:16]}"
+        self._texts.setdefault(key, base64.b64encode(raw).decode())
+        return {"block": key, "type": kind, "offset": offset}
+
+    def html(self) -> str:
+        return "\n".join(f'<script type="text/plain" id="{key}">{text}</script>' for key, text in self._texts.items())
+
+
+def _kept_samples(a: Assessment) -> NDArray[np.intp] | None:
+    """The samples drawn, or None for all of them; six extremes a group make at most DRAWN_SAMPLES."""
+    if a.target.size <= DRAWN_SAMPLES:
+        return None
+    columns = (a.target, a.measured, a.measured - a.target)
+    return display.extremes(columns, display.even_edges(a.target.size, DRAWN_SAMPLES // 6))
+
+
+def _kept_points(columns: Sequence[NDArray[np.float64]], logarithmic: bool = False) -> NDArray[np.intp] | None:
+    n = columns[0].size
+    if n <= DRAWN_POINTS:
+        return None
+    edges = display.log_edges if logarithmic else display.even_edges
+    return display.extremes(columns, edges(n, DRAWN_POINTS // (2 * len(columns))))
+
+
+def _take(values: NDArray[Any], kept: NDArray[np.intp] | None) -> NDArray[Any]:
+    return values if kept is None else values[kept]
+
+
+def _drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any]:
+    drawing = {
+        "unit": a.unit or "",
+        "amplitude": a.tracking.amplitude,
+        "delay_s": a.tracking.delay_s,
+        "equivalent_frequency_hz": a.tracking.equivalent_frequency_hz,
+        "limits": dataclasses.asdict(a.limits),
+        "time": _time_drawing(a, blocks),
+        "histories": _histories_drawing(a, blocks),
+        "moving": _moving_drawing(a, blocks),
+        "spectrum": _spectrum_drawing(a, blocks),
+        "response": _response_drawing(a, blocks),
+        "frequency": _frequency_drawing(a),
+    }
+    plain = _plain(drawing)
+    assert isinstance(plain, dict)
+    return plain
+
+
+def _time_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any]:
+    target_role, measured_role = display.signal_roles(a.part)
+    target_label, measured_label = _signal(target_role, a.target_name), _signal(measured_role, a.measured_name)
+    kept = _kept_samples(a)
+    first, end = display.strongest_span(a.target, a.rate_hz)
+    whole = end - first == a.target.size
+    return {
+        "start": a.start_s,
+        "step": 1 / a.rate_hz,
+        "n": a.target.size,
+        "index": None if kept is None else blocks.column(kept),
+        "drawn": a.target.size if kept is None else kept.size,
+        "target": blocks.column(_take(a.target, kept)),
+        "measured": blocks.column(_take(a.measured, kept)),
+        "strongest": None if whole else [a.start_s + first / a.rate_hz, a.start_s + (end - 1) / a.rate_hz],
+        "strongest_label": f"Strongest {display.STRONGEST_S:g} s",
+        "label": display.with_unit(display.quantity(a.unit), a.unit),
+        "error_label": display.with_unit("Error", a.unit),
+        "error_name": f"{measured_role} \N{MINUS SIGN} {target_role}",
+        "target_label": target_label,
+        "measured_label": measured_label,
+        "x_label": display.with_unit(target_label[0].upper() + target_label[1:], a.unit),
+        "y_label": display.with_unit(measured_label[0].upper() + measured_label[1:], a.unit),
+    }
+
+
+def _signal(role: str, name: str) -> str:
+    return role if name.lower() == role else f"{role}: {name}"
+
+
+def _histories_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any]:
+    h = a.histories
+    columns = {
+        "max_tracking_error": h.max_tracking_error,
+        "rms_error": h.rms_error,
+        "tracking_indicator": h.tracking_indicator,
+    }
+    if h.energy_error is not None:
+        columns["energy_error"] = h.energy_error
+    kept = _kept_points(list(columns.values()))
+    n = h.rms_error.size
+    return {
+        "start": a.start_s,
+        "step": 1 / h.rate_hz,
+        "n": n,
+        "index": None if kept is None else blocks.column(kept),
+        "drawn": n if kept is None else kept.size,
+        "error_label": display.with_unit("Error so far", a.unit),
+        "indicator_label": f"TI ({a.unit}²)" if a.unit else "TI (unit not stated)",
+        **{name: blocks.column(_take(column, kept)) for name, column in columns.items()},
+    }
+
+
+def _moving_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any] | None:
+    m = a.moving
+    if m is None or m.time_s.size == 0:
+        return None
+    amplitude, delay_s = np.where(m.valid, m.amplitude, np.nan), np.where(m.valid, m.delay_s, np.nan)
+    kept = _kept_points([amplitude, delay_s])
+    edges = np.flatnonzero(np.diff(np.concatenate(([True], m.valid, [True])).astype(np.int8)))
+    half = m.hop_s / 2
+    invalid = [
+        [a.start_s + m.time_s[first] - half, a.start_s + m.time_s[end - 1] + half]
+        for first, end in zip(edges[::2], edges[1::2], strict=True)
+    ]
+    return {
+        "n": m.time_s.size,
+        "drawn": m.time_s.size if kept is None else kept.size,
+        "time": blocks.column(_take(a.start_s + m.time_s, kept)),
+        "amplitude": blocks.column(_take(amplitude, kept)),
+        "delay_s": blocks.column(_take(delay_s, kept)),
+        "invalid": invalid,
+    }
+
+
+def _spectrum_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any] | None:
+    t = a.tracking
+    if t.frequency_hz is None or t.weights is None or t.target_spectrum is None or t.measured_spectrum is None:
+        return None
+    scale = display.fourier_scale(t)
+    target, measured = np.abs(t.target_spectrum) * scale, np.abs(t.measured_spectrum) * scale
+    kept = _kept_points([target, measured, t.weights], logarithmic=True)
+    return {
+        "n": t.frequency_hz.size,
+        "drawn": t.frequency_hz.size if kept is None else kept.size,
+        "frequency": blocks.column(_take(t.frequency_hz, kept)),
+        "target": blocks.column(_take(target, kept)),
+        "measured": blocks.column(_take(measured, kept)),
+        "weights": blocks.column(_take(t.weights, kept)),
+        "label": f"Fourier amplitude ({a.unit} s)" if a.unit else "Fourier amplitude (unit not stated)",
+        "unit": f"{a.unit} s" if a.unit else "",
+    }
+
+
+def _response_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any] | None:
+    r = a.response
+    if r is None:
+        return None
+    above_zero = r.frequency_hz > 0
+    frequency, gain, delay_s, coherence = (
+        column[above_zero] for column in (r.frequency_hz, r.gain, r.delay_s, r.coherence)
+    )
+    if frequency.size == 0:
+        return None
+    kept = _kept_points([gain, delay_s, coherence], logarithmic=True)
+    return {
+        "n": frequency.size,
+        "drawn": frequency.size if kept is None else kept.size,
+        "low_coherence": display.LOW_COHERENCE,
+        "frequency": blocks.column(_take(frequency, kept)),
+        "gain": blocks.column(_take(gain, kept)),
+        "delay_s": blocks.column(_take(delay_s, kept)),
+        "coherence": blocks.column(_take(coherence, kept)),
+    }
+
+
+def _frequency_drawing(a: Assessment) -> dict[str, Any] | None:
+    """What the frequency axis spans, what it shows first, and the parts that were not judged."""
+    judged, welch = a.tracking.frequency_hz, None if a.response is None else a.response.frequency_hz
+    axes = [axis[axis > 0] for axis in (judged, welch) if axis is not None]
+    axes = [axis for axis in axes if axis.size]
+    if not axes:
+        return None
+    low, high = min(float(axis[0]) for axis in axes), max(float(axis[-1]) for axis in axes)
+    if not low < high:
+        return None
+    outside = []
+    if judged is not None and judged.size:
+        first, last = float(judged[0]), float(judged[-1])
+        outside = [[low, first]] * (first > low) + [[last, high]] * (last < high)
+    home = display.judged_range(a.tracking)
+    inside = home is not None and low <= home[0] < home[1] <= high
+    return {"extent": [low, high], "home": home if inside else [low, high], "outside": outside}
+
+
+# ---------------------------------------------------------------------------------------------------- the page's parts
+
+
+def _name(a: Assessment, several_files: bool = True) -> str:
+    parts = [Path(a.file).name] if several_files else []
+    parts.append(f"actuator {a.actuator}")
+    if a.part != "whole":
+        parts.append(a.part)
+    return " · ".join(parts)
+
+
+def _summary(assessments: Sequence[Assessment]) -> str:
+    """The table of all, one row per assessment."""
+    heads = (
+        "File",
+        "Actuator",
+        "Part",
+        "Pair",
+        "Amplitude",
+        "Delay (ms)",
+        "Equivalent frequency (Hz)",
+        "RMS error (%)",
+    )
+    rows = []
+    for number, a in enumerate(assessments):
+        t = a.tracking
+        state = []
+        if a.exceeded:
+            state.append('<strong class="exceeded">limit exceeded</strong>')
+        elif a.limits.delay_s is not None or a.limits.amplitude is not None:
+            state.append("within limits")
+        if a.warnings:
+            state.append(f"{len(a.warnings)} {'warning' if len(a.warnings) == 1 else 'warnings'}")
+        numbers = (
+            _number("amplitude", float(t.amplitude)),
+            _number("delay_s", float(t.delay_s), factor=1e3),
+            _number("equivalent_frequency_hz", float(t.equivalent_frequency_hz)),
+            _number("rms_error_percent", a.indices.rms_error_percent),
+        )
+        rows.append(
+            f'<tr data-assessment="{number}"><th scope="row"><a href="#assessment-{number}">{escape(a.file)}</a></th>'
+            f"<td>{a.actuator}</td><td>{escape(a.part)}</td>"
+            f"<td>{escape(a.target_name)} → {escape(a.measured_name)}</td>"
+            + "".join(f'<td class="number">{text}</td>' for text in numbers)
+            + f"<td>{', '.join(state)}</td></tr>"
+        )
+    head = "".join(
+        f'<th scope="col"{" class=number" if at >= 4 else ""}>{escape(text)}</th>' for at, text in enumerate(heads)
+    )
+    return (
+        '<section class="summary"><h2>Summary</h2><div class="scroll"><table>'
+        f'<thead><tr>{head}<th scope="col">Remarks</th></tr></thead>'
+        f"<tbody>{''.join(rows)}</tbody></table></div></section>"
+    )
+
+
+def _tabs(assessments: Sequence[Assessment]) -> str:
+    several_files = len({a.file for a in assessments}) > 1
+    tabs = "".join(
+        f'<button type="button" role="tab" id="tab-{number}" aria-controls="assessment-{number}" '
+        f'aria-selected="{str(number == 0).lower()}" tabindex="{0 if number == 0 else -1}">'
+        f"{'<span class=mark aria-label=&quot;limit exceeded&quot;>▲</span> ' if a.exceeded else ''}"
+        f"{escape(_name(a, several_files))}</button>"
+        for number, a in enumerate(assessments)
+    )
+    return f'<div class="tabs" role="tablist" aria-label="Evaluated pairs">{tabs}</div>'
+
+
+def _section(a: Assessment, drawing: Mapping[str, Any], opening: str, version: str, created: datetime) -> str:
+    return "\n".join(
+        (
+            opening,
+            _heading(a),
+            _key_numbers(a),
+            _notice("warnings", ("Warning", "Warnings"), a.warnings),
+            _time_charts(a, drawing),
+            _frequency_charts(a, drawing),
+            _index_charts(drawing),
+            _settings_table(a, version, created),
+            "</section>",
+        )
+    )
+
+
+def _heading(a: Assessment) -> str:
+    target_role, measured_role = display.signal_roles(a.part)
+    what = {"compensator": "compensator alone", "actuator": "actuator alone"}.get(a.part, "")
+    facts = [
+        escape(a.file),
+        f"actuator {a.actuator}" + (f", {what}" if what else ""),
+        f"{escape(_signal(target_role, a.target_name))} → {escape(_signal(measured_role, a.measured_name))}",
+        f"{_number('n_samples', int(a.target.size))} samples at {display.significant(a.rate_hz, 6)} Hz",
+    ]
+    return (
+        f'<p class="facts">{" · ".join(facts)}</p>'
+        f'<h2 class="verdict" data-field="verdict">{escape(a.verdict)}</h2>'
+        + _notice("exceeded", ("Limit exceeded", "Limits exceeded"), a.exceeded)
+    )
+
+
+def _key_numbers(a: Assessment) -> str:
+    t, reasons = a.tracking, _reasons(a)
+    _, measured_role = display.signal_roles(a.part)
+    target_role, _ = display.signal_roles(a.part)
+    delay = float(t.delay_s)
+    sense = f"{measured_role} {'lags' if delay > 0 else 'leads'}" if math.isfinite(delay) and delay != 0 else ""
+    large = (
+        ("Amplitude A", _number("amplitude", float(t.amplitude), reason=reasons.get("amplitude")), "1 is perfect"),
+        ("Delay d", _number("delay_s", delay, "ms", 1e3, reasons.get("delay_s")), sense),
+        (
+            "Phase",
+            _number("phase_rad", float(t.phase_rad), "°", 180 / math.pi, reasons.get("phase_rad")),
+            "negative on lag",
+        ),
+        (
+            "Equivalent frequency",
+            _number(
+                "equivalent_frequency_hz",
+                float(t.equivalent_frequency_hz),
+                "Hz",
+                reason=reasons.get("equivalent_frequency_hz"),
+            ),
+            f"from {_number('n_bins', int(t.n_bins))} bins, {_number('delta_f_hz', float(t.delta_f_hz), 'Hz')} apart",
+        ),
+    )
+    tiles = "".join(f"<div><dt>{name}</dt><dd>{value}<small>{note}</small></dd></div>" for name, value, note in large)
+    return (
+        f'<dl class="tiles">{tiles}</dl><div class="columns">'
+        f"{_limit_table(a)}{_index_table(a, target_role, measured_role, reasons)}</div>"
+    )
+
+
+def _limit_table(a: Assessment) -> str:
+    t, rows = a.tracking, []
+    for field, name, value, limit, unit, factor in (
+        ("limit_delay_s", "|d|", abs(float(t.delay_s)), a.limits.delay_s, "ms", 1e3),
+        ("limit_amplitude", "|A \N{MINUS SIGN} 1|", abs(float(t.amplitude) - 1), a.limits.amplitude, "", 1.0),
+    ):
+        if limit is None:
+            continue
+        if math.isfinite(value):
+            over = value > limit
+            state = '<strong class="exceeded">exceeded</strong>' if over else "within"
+            shown = f"{display.significant(value * factor)} {unit}"
+        else:
+            state, shown = NOT_DETERMINED, NOT_DETERMINED
+        rows.append(
+            f'<tr><th scope="row">{name}</th><td class="number">{shown}</td>'
+            f'<td class="number">{_number(field, limit, unit, factor)}</td>'
+            f'<td data-field="{field}_state">{state}</td></tr>'
+        )
+    if not rows:
+        return '<div><h3>Limits</h3><p class="muted">None were set.</p></div>'
+    return (
+        '<div><h3>Limits</h3><table><thead><tr><th></th><th scope="col" class="number">found</th>'
+        f'<th scope="col" class="number">allowed</th><th></th></tr></thead><tbody>{"".join(rows)}</tbody></table></div>'
+    )
+
+
+def _index_table(a: Assessment, target_role: str, measured_role: str, reasons: Mapping[str, str]) -> str:
+    units = {"unit": a.unit or "", "unit2": f"{a.unit}²" if a.unit else ""}
+    rows = []
+    for field, name, unit, factor, meaning in _INDICES:
+        value = getattr(a.indices, field)
+        text = meaning.format(target=target_role, measured=measured_role)
+        shown = _number(field, value, units.get(unit, unit), factor, reasons.get(field))
+        rows.append(
+            f'<tr><th scope="row">{name}</th><td class="number">{shown}</td><td class="muted">{escape(text)}</td></tr>'
+        )
+    return f"<div><h3>Indices in the time domain</h3><table><tbody>{''.join(rows)}</tbody></table></div>"
+
+
+def _notice(field: str, heads: tuple[str, str], texts: Sequence[str]) -> str:
+    if not texts:
+        return ""
+    items = "".join(f"<li>{escape(text)}</li>" for text in texts)
+    head = heads[len(texts) > 1]
+    return f'<div class="notice {field}" role="note"><h3>{head}</h3><ul data-field="{field}">{items}</ul></div>'
+
+
+def _chart(name: str, label: str, caption: str = "") -> str:
+    text = f"<figcaption>{caption}</figcaption>" if caption else ""
+    return (
+        f'<figure><div class="chart" data-chart="{name}" role="img" aria-label="{escape(label)}"></div>{text}</figure>'
+    )
+
+
+def _thinned(drawing: Mapping[str, Any], points: str) -> str:
+    """What a caption says where not every point is drawn."""
+    if drawing["drawn"] >= drawing["n"]:
+        return ""
+    return (
+        f' <span class="thinned">{drawing["drawn"]} of {drawing["n"]} {points} are drawn: the extremes of every group '
+        "of neighbours. The numbers use all.</span>"
+    )
+
+
+def _time_charts(a: Assessment, drawing: Mapping[str, Any]) -> str:
+    target_role, measured_role = display.signal_roles(a.part)
+    if a.moving is None or drawing["moving"] is None:
+        reason = a.moving_note or "there is no reading"
+        moving = f'<p class="absent" data-field="moving">A(t) and d(t) {NOT_DETERMINED}: {escape(reason)}</p>'
+    else:
+        m = a.moving
+        text = (
+            f"{int(np.count_nonzero(m.valid))} of {m.time_s.size} windows of {display.significant(m.window_s)} s "
+            f"judged, one every {display.significant(m.hop_s)} s, drawn at the window's centre. Grey: {target_role} "
+            "moves too little in the window to judge by (standard deviation below "
+            f"{m.minimum_std_ratio:.3g} of the record's)."
+        )
+        moving = _chart("moving-amplitude", "Amplitude over time")
+        moving += _chart("moving-delay", "Delay over time", text + _thinned(drawing["moving"], "windows"))
+    return (
+        '<section class="charts"><div class="head"><h3>Over time</h3><div class="views" data-views="time"></div>'
+        '<p class="hint">Drag to zoom, double click to go back. Keys: \N{LEFTWARDS ARROW} \N{RIGHTWARDS ARROW} '
+        "move, + \N{MINUS SIGN} zoom, 0 back.</p></div>"
+        '<div class="with-loop"><div>'
+        + _chart("history", f"{target_role} and {measured_role} over time")
+        + _chart("error", f"{measured_role} less {target_role} over time", _thinned(drawing["time"], "samples"))
+        + "</div>"
+        + _chart(
+            "loop",
+            f"{measured_role} against {target_role}",
+            f"{measured_role.capitalize()} against {target_role}, over the time shown. Dashed: perfect tracking. "
+            "The loop opens by lag or lead; its slope is the amplitude.",
+        )
+        + f"</div>{moving}</section>"
+    )
+
+
+def _frequency_charts(a: Assessment, drawing: Mapping[str, Any]) -> str:
+    parts = []
+    if drawing["spectrum"] is not None:
+        parts.append(_chart("spectra", "Amplitude spectra", _thinned(drawing["spectrum"], "bins")))
+        parts.append(
+            _chart(
+                "weights",
+                "Weights of the evaluation over frequency",
+                "The share of each bin in the evaluation; all together make one.",
+            )
+        )
+    if drawing["response"] is not None and a.response is not None:
+        r = a.response
+        text = (
+            f"Welch's method: {r.n_segments} segments of {display.significant(r.segment_s)} s, {escape(r.window)} "
+            f"window. Grey: coherence below {display.LOW_COHERENCE}, not to be relied on. Dotted: A and d of the "
+            "evaluation."
+        )
+        parts.append(_chart("gain", "Gain over frequency"))
+        parts.append(_chart("delay", "Delay over frequency"))
+        parts.append(_chart("coherence", "Coherence over frequency", text + _thinned(drawing["response"], "bins")))
+    else:
+        reason = a.response_note or "there is no frequency above zero"
+        parts.append(
+            f'<p class="absent" data-field="response">Gain, delay and coherence over frequency {NOT_DETERMINED}: '
+            f"{escape(reason)}</p>"
+        )
+    return (
+        '<section class="charts"><div class="head"><h3>Over frequency</h3>'
+        '<div class="views" data-views="frequency"></div>'
+        '<p class="hint">Shaded: outside what was judged.</p></div>'
+        f'<div class="pairs">{"".join(parts)}</div></section>'
+    )
+
+
+def _index_charts(drawing: Mapping[str, Any]) -> str:
+    histories = drawing["histories"]
+    energy = _chart("energy", "Energy error over time") if "energy_error" in histories else ""
+    return (
+        '<section class="charts"><div class="head"><h3>Indices over time</h3>'
+        '<p class="hint">Their last values are those of the whole record. The time shown is that of the charts above.'
+        '</p></div><div class="pairs">'
+        + _chart("running-errors", "Largest error and RMS error so far", _thinned(histories, "samples"))
+        + _chart("indicator", "Tracking indicator over time", "TI rises while the measured signal lags.")
+        + f"{energy}</div></section>"
+    )
+
+
+def _settings_table(a: Assessment, version: str, created: datetime) -> str:
+    settings = {**dataclasses.asdict(a.tracking.settings), **a.settings}
+    rows = [
+        ("file", "File", a.file),
+        ("start_s", "Start of the evaluated part", f"{display.significant(a.start_s, 6)} s"),
+        ("duration_s", "Duration", f"{display.significant(a.target.size / a.rate_hz, 6)} s"),
+        ("unit", "Unit", a.unit or "not stated"),
+    ]
+    rows += [(name, *_setting(name, value)) for name, value in _flat(settings)]
+    if a.moving is not None:
+        m = a.moving
+        text = f"{display.significant(m.window_s)} s, one every {display.significant(m.hop_s)} s, {m.settings.window}"
+        rows.append(("moving", "Moving window", text))
+    if a.response is not None:
+        r = a.response
+        text = (
+            f"Welch, {r.n_segments} segments of {display.significant(r.segment_s)} s, overlap {r.overlap:g}, "
+            f"{r.window}, detrend {r.detrend}"
+        )
+        rows.append(("response", "Frequency response", text))
+    rows += [("program", "Program", f"rthstrack {version}"), ("created", "Written", f"{created:%Y-%m-%d %H:%M %Z}")]
+    body = "".join(
+        f'<tr><th scope="row">{escape(label)}</th><td data-setting="{escape(name)}">{escape(text)}</td></tr>'
+        for name, label, text in rows
+    )
+    return f'<section class="settings"><h3>Settings</h3><table><tbody>{body}</tbody></table></section>'
+
+
+def _footer() -> str:
+    return """<footer><h2>Signs and words</h2>
+<p>A delay above zero means that the measured signal <em>lags</em> the target (its phase is then negative); below zero
+it leads. Amplitude is measured over target; 1 is perfect. The evaluation is the frequency-domain one of Guo, Chen, Xu and
+Sanchez (2014), Smart Mater. Struct. 23 045042: one complex gain, the mean of measured over target with the weights
+|target|<sup>l</sup>, gives the amplitude A and the phase; the delay is d = \N{MINUS SIGN}phase / (2π f_eq) at the
+equivalent frequency f_eq, the mean frequency with the same weights.</p>
+<p class="muted">Numbers here have four significant digits; the block <code>results</code> in the source of this page
+holds them in full as JSON. Charts: uPlot 1.6.32, MIT licence, in the source.</p></footer>"""

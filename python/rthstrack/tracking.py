@@ -1,0 +1,539 @@
+"""The evaluation of Guo, Xu and Chen (2014), for whole records, moving windows and over frequency.
+
+Signs: delay_s > 0 means measured lags target; amplitude 1 is perfect. Units are SI; displacements keep the unit they
+come in. Signals are arrays of shape (n_samples,) or (n_samples, n_actuators).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import operator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from rthstrack import _core
+from rthstrack.errors import RthstrackError, SettingError, SignalError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    import pandas as pd
+    from numpy.typing import ArrayLike, NDArray
+
+
+class _Result:
+    """What all results can do."""
+
+    __slots__ = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain Python values: numbers, strings, lists, dicts; a complex number is [real, imaginary]."""
+        return cast("dict[str, Any]", _plain(self))
+
+    def to_frame(self) -> pd.DataFrame:
+        """A pandas DataFrame, a row an actuator, reading, frequency or sample; needs pandas."""
+        try:
+            import pandas as pd
+        except ImportError:
+            raise RthstrackError("to_frame needs pandas, which is not installed: pip install 'rthstrack[pandas]'") from None
+        return pd.DataFrame(self._columns())
+
+    def _columns(self) -> dict[str, Any]:
+        raise NotImplementedError
+
+
+def _plain(value: Any) -> Any:
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: _plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    if isinstance(value, np.ndarray):
+        return [_plain(v) for v in value] if value.ndim else _plain(value.item())
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    if isinstance(value, complex):
+        return [value.real, value.imag]
+    if isinstance(value, tuple | list):
+        return [_plain(v) for v in value]
+    return value
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How an evaluation was made; the words and defaults are those of `evaluate`."""
+
+    estimator: str = "fei"
+    data_decimation: int = 1
+    frequency_decimation: int = 1
+    decimator: str = "spectral"
+    weight_power: int = 2
+    window: str = "boxcar"
+    detrend: str = "none"
+    band_hz: tuple[float, float] | None = None
+
+    def _checked(self) -> Settings:
+        """The same with plain Python types, so that it can be hashed, compared and written."""
+        band = self.band_hz
+        if band is not None:
+            try:
+                low, high = band
+                band = (float(low), float(high))
+            except (TypeError, ValueError):
+                raise SettingError(f"band_hz must be two frequencies (low, high) in Hz, not {self.band_hz!r}") from None
+        return Settings(
+            str(self.estimator),
+            _count("data_decimation", self.data_decimation),
+            _count("frequency_decimation", self.frequency_decimation),
+            str(self.decimator),
+            _count("weight_power", self.weight_power),
+            str(self.window),
+            str(self.detrend),
+            band,
+        )
+
+    def _arguments(self) -> tuple[Any, ...]:
+        """In the order in which the core takes them."""
+        return (
+            self.estimator,
+            self.data_decimation,
+            self.frequency_decimation,
+            self.decimator,
+            self.weight_power,
+            self.window,
+            self.detrend,
+            self.band_hz,
+        )
+
+
+def _count(name: str, value: Any) -> int:
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise SettingError(f"{name} must be a whole number, not {value!r}") from None
+    if not 0 < number < 2**32:
+        raise SettingError(f"{name} must be a whole number from 1 on, not {number}")
+    return number
+
+
+def _number(name: str, value: Any) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise SettingError(f"{name} must be a number, not {value!r}") from None
+
+
+def _samples(name: str, samples: ArrayLike) -> NDArray[np.float64]:
+    """C-contiguous float64 of one or two dimensions; no copy where it already is."""
+    if type(samples) is np.ndarray and samples.dtype == np.float64 and samples.flags.c_contiguous:
+        array = samples
+    else:
+        # A masked sample is a missing one.
+        array = samples.filled(np.nan) if isinstance(samples, np.ma.MaskedArray) else np.asarray(samples)
+        if array.dtype.kind not in "fiu":
+            raise SignalError(f"{name} must hold real numbers, not {array.dtype}")
+        array = np.ascontiguousarray(array, dtype=np.float64)
+    if array.ndim not in (1, 2):
+        raise SignalError(
+            f"{name} must have the shape (n_samples,) or (n_samples, n_actuators), not {array.shape}"
+        )
+    return array
+
+
+def _pair(target: ArrayLike, measured: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    t, m = _samples("target", target), _samples("measured", measured)
+    if t.shape != m.shape:
+        if t.ndim == m.ndim == 1:
+            raise SignalError(
+                f"measured has {m.size} samples but target has {t.size}: both must cover the same samples"
+            )
+        raise SignalError(f"target and measured must have the same shape, not {t.shape} and {m.shape}")
+    if t.ndim == 2 and t.shape[1] == 0:
+        raise SignalError(f"target has the shape {t.shape}: at least one actuator is needed")
+    return t, m
+
+
+def _single(target: ArrayLike, measured: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    t, m = _pair(target, measured)
+    if t.ndim != 1:
+        raise SignalError(f"one actuator at a time is taken here: pass one column, not an array of shape {t.shape}")
+    return t, m
+
+
+def _time_s(n_samples: int, rate_hz: float) -> NDArray[np.float64]:
+    return np.arange(n_samples) / rate_hz
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tracking(_Result):
+    """Amplitude and delay of measured over target for one record (Eqs 6-12).
+
+    Scalars for one pair, arrays of shape (n_actuators,) for several.
+    With `weights=True` also, per kept bin (n_bins,) or (n_bins, n_actuators): `frequency_hz` (n_bins,), `weights`
+    (sum to one), `target_spectrum` and `measured_spectrum` (complex DFT of the windowed, zero-padded signals).
+    """
+
+    amplitude: float | NDArray[np.float64]
+    phase_rad: float | NDArray[np.float64]
+    delay_s: float | NDArray[np.float64]
+    equivalent_frequency_hz: float | NDArray[np.float64]
+    fei: complex | NDArray[np.complex128]
+    n_bins: int
+    delta_f_hz: float
+    rate_hz: float
+    n_samples: int
+    settings: Settings
+    frequency_hz: NDArray[np.float64] | None = None
+    weights: NDArray[np.float64] | None = None
+    target_spectrum: NDArray[np.complex128] | None = None
+    measured_spectrum: NDArray[np.complex128] | None = None
+
+    def _columns(self) -> dict[str, Any]:
+        numbers = {
+            name: np.atleast_1d(getattr(self, name))
+            for name in ("amplitude", "phase_rad", "delay_s", "equivalent_frequency_hz", "fei")
+        }
+        same = {"n_bins": self.n_bins, "delta_f_hz": self.delta_f_hz, "rate_hz": self.rate_hz, "n_samples": self.n_samples}
+        n = len(numbers["amplitude"])
+        settings = {key: [value] * n for key, value in dataclasses.asdict(self.settings).items()}
+        return {"actuator": np.arange(n)} | numbers | {key: [value] * n for key, value in same.items()} | settings
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MovingTracking(_Result):
+    """The same over moving windows: arrays (n_readings,) or (n_readings, n_actuators).
+
+    `time_s` is each window's centre, counted from the first sample. Where `valid` is False the target has too little
+    energy in the window to judge by, and the numbers are NaN.
+    """
+
+    time_s: NDArray[np.float64]
+    amplitude: NDArray[np.float64]
+    phase_rad: NDArray[np.float64]
+    delay_s: NDArray[np.float64]
+    equivalent_frequency_hz: NDArray[np.float64]
+    valid: NDArray[np.bool_]
+    window_s: float
+    hop_s: float
+    minimum_std_ratio: float
+    rate_hz: float
+    settings: Settings
+
+    def _columns(self) -> dict[str, Any]:
+        n_actuators = 1 if self.amplitude.ndim == 1 else self.amplitude.shape[1]
+        names = ("amplitude", "phase_rad", "delay_s", "equivalent_frequency_hz", "valid")
+        return {
+            "time_s": np.repeat(self.time_s, n_actuators),
+            "actuator": np.tile(np.arange(n_actuators), self.time_s.size),
+        } | {name: getattr(self, name).reshape(-1) for name in names}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrequencyResponse(_Result):
+    """Gain, phase, delay and coherence of measured over target by Welch's method: arrays (n_bins,).
+
+    gain = |S_IO| / S_II (H1); phase_rad is unwrapped; delay_s = -phase_rad / (2 pi f); coherence is 0..1.
+    `target_psd`, `measured_psd` are one-sided densities in unit^2/Hz.
+    """
+
+    frequency_hz: NDArray[np.float64]
+    gain: NDArray[np.float64]
+    phase_rad: NDArray[np.float64]
+    delay_s: NDArray[np.float64]
+    coherence: NDArray[np.float64]
+    target_psd: NDArray[np.float64]
+    measured_psd: NDArray[np.float64]
+    segment_s: float
+    overlap: float
+    n_segments: int
+    window: str
+    detrend: str
+    rate_hz: float
+
+    def _columns(self) -> dict[str, Any]:
+        names = ("frequency_hz", "gain", "phase_rad", "delay_s", "coherence", "target_psd", "measured_psd")
+        return {name: getattr(self, name) for name in names}
+
+
+@dataclass(frozen=True, slots=True)
+class Indices(_Result):
+    """The time-domain indices in use beside the FEI (method section 9). Lag makes `tracking_indicator` positive.
+
+    `energy_error` is None unless the measured force was given.
+    """
+
+    max_tracking_error: float
+    max_tracking_error_percent: float
+    rms_error: float
+    rms_error_percent: float
+    tracking_indicator: float
+    j1_s: float
+    j2_percent: float
+    j3_percent: float
+    energy_error: float | None = None
+
+    def _columns(self) -> dict[str, Any]:
+        return {f.name: [getattr(self, f.name)] for f in dataclasses.fields(self)}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class IndexHistories(_Result):
+    """Those indices that are histories, at every sample: arrays (n_samples,)."""
+
+    max_tracking_error: NDArray[np.float64]
+    rms_error: NDArray[np.float64]
+    tracking_indicator: NDArray[np.float64]
+    energy_error: NDArray[np.float64] | None
+    rate_hz: float
+
+    def _columns(self) -> dict[str, Any]:
+        names = ("max_tracking_error", "rms_error", "tracking_indicator", "energy_error")
+        columns = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+        return {"time_s": _time_s(self.rms_error.size, self.rate_hz)} | columns
+
+
+@lru_cache(maxsize=64)
+def _plan(n_samples: int, rate_hz: float, settings: Settings) -> _core.Evaluator:
+    return _core.Evaluator(n_samples, rate_hz, *settings._arguments())
+
+
+class Evaluator:
+    """A plan for many records of one length and rate: checked and computed once, immutable, usable from many threads.
+
+    Takes the settings of `evaluate`; raises SettingError or SignalError where they are impossible for that length.
+    """
+
+    __slots__ = ("_plan", "n_samples", "rate_hz", "settings")
+
+    def __init__(self, n_samples: int, rate_hz: float, settings: Settings | None = None, **changes: Any) -> None:
+        try:
+            self.settings = dataclasses.replace(settings or Settings(), **changes)._checked()
+        except TypeError:
+            known = [f.name for f in dataclasses.fields(Settings)]
+            unknown = [name for name in changes if name not in known]
+            raise SettingError(f"unknown setting {', '.join(unknown)}: expected {', '.join(known)}") from None
+        self.n_samples = _count("n_samples", n_samples)
+        self.rate_hz = _number("rate_hz", rate_hz)
+        self._plan = _plan(self.n_samples, self.rate_hz, self.settings)
+
+    @property
+    def n_bins(self) -> int:
+        """Number of frequency bins that P, Q and the band keep."""
+        return self._plan.n_bins
+
+    @property
+    def delta_f_hz(self) -> float:
+        """Spacing of the kept bins, Q rate / n (Eq 9), in hertz."""
+        return self._plan.delta_f_hz
+
+    def evaluate(self, target: ArrayLike, measured: ArrayLike, *, weights: bool = False) -> Tracking:
+        """As the function `evaluate`, for signals of this length and rate."""
+        t, m = _pair(target, measured)
+        if len(t) != self.n_samples:
+            raise SignalError(f"this evaluator is planned for {self.n_samples} samples, not for {len(t)}")
+        return _tracking(self._plan, self.settings, self.rate_hz, t, m, weights)
+
+
+def evaluate(
+    target: ArrayLike,
+    measured: ArrayLike,
+    rate_hz: float,
+    *,
+    estimator: str = "fei",
+    data_decimation: int = 1,
+    frequency_decimation: int = 1,
+    decimator: str = "spectral",
+    weight_power: int = 2,
+    window: str = "boxcar",
+    detrend: str = "none",
+    band_hz: tuple[float, float] | None = None,
+    weights: bool = False,
+) -> Tracking:
+    """Amplitude and delay of measured over target for whole records (Guo, Xu and Chen 2014, Eqs 1-12).
+
+    FEI = sum O_k conj(I_k) |I_k|^(l-2) / sum |I_k|^l,  f_eq = sum f_k |I_k|^l / sum |I_k|^l,
+    A = |FEI|,  phi = atan2(Im FEI, Re FEI),  d = -phi / (2 pi f_eq),
+    over the bins k = Q, 2Q, ... <= p/P of the transform zero-padded to n = 2^ceil(log2 L) = 2p points.
+
+    target, measured: (n_samples,) or (n_samples, n_actuators), any one unit; rate_hz: samples a second.
+    data_decimation: P, a power of two: keeps frequencies up to rate/(2P); decimator "spectral" keeps exactly the bins of
+    the undecimated transform, "chebyshev" filters and resamples as the paper did.
+    frequency_decimation: Q, a power of two: keeps every Q-th bin.
+    weight_power: l, 1 to 16. window: boxcar, hann, hamming, blackman, flattop or tukey (alpha 0.5).
+    detrend: none, mean or linear. band_hz: lowest and highest frequency kept, both included.
+    weights: also return the kept bins with their weights and spectra.
+
+    delay_s > 0: measured lags. Raises SignalError for samples that cannot be judged, SettingError for settings.
+
+    >>> import numpy as np
+    >>> t = np.arange(4096) / 1024
+    >>> target = np.sin(2 * np.pi * t) * np.hanning(4096)
+    >>> measured = 0.98 * np.interp(t - 0.012, t, target)
+    >>> result = evaluate(target, measured, 1024)
+    >>> print(f"{result.amplitude:.3f}, lags by {1e3 * result.delay_s:.2f} ms")
+    0.980, lags by 12.00 ms
+    """
+    t, m = _pair(target, measured)
+    settings = Settings(
+        estimator,
+        data_decimation,
+        frequency_decimation,
+        decimator,
+        weight_power,
+        window,
+        detrend,
+        band_hz,
+    )._checked()
+    rate_hz = _number("rate_hz", rate_hz)
+    return _tracking(_plan(len(t), rate_hz, settings), settings, rate_hz, t, m, weights)
+
+
+def _tracking(
+    plan: _core.Evaluator,
+    settings: Settings,
+    rate_hz: float,
+    target: NDArray[np.float64],
+    measured: NDArray[np.float64],
+    weights: bool,
+) -> Tracking:
+    spectra: tuple[Any, ...] = ()
+    if weights:
+        found = plan.evaluate_with_spectra(target, measured)
+        numbers = [n for n, _ in found]
+        if target.ndim == 1:
+            spectra = found[0][1]
+        else:
+            columns = list(zip(*(s for _, s in found), strict=True))
+            spectra = (columns[0][0], *(np.stack(column, axis=1) for column in columns[1:]))
+    else:
+        numbers = plan.evaluate(target, measured)
+    values: Sequence[Any] = numbers[0] if target.ndim == 1 else [np.array(v) for v in zip(*numbers, strict=True)]
+    return Tracking(*values, plan.n_bins, plan.delta_f_hz, rate_hz, len(target), settings, *spectra)
+
+
+def _each_actuator(
+    target: NDArray[np.float64],
+    measured: NDArray[np.float64],
+    call: Callable[[NDArray[np.float64], NDArray[np.float64]], tuple[NDArray[Any], ...]],
+) -> tuple[NDArray[Any], ...]:
+    """Applies `call` to each column and stacks what it returns."""
+    if target.ndim == 1:
+        return call(target, measured)
+    found = [
+        call(np.ascontiguousarray(target[:, a]), np.ascontiguousarray(measured[:, a])) for a in range(target.shape[1])
+    ]
+    return tuple(np.stack(column, axis=1) for column in zip(*found, strict=True))
+
+
+def evaluate_moving(
+    target: ArrayLike,
+    measured: ArrayLike,
+    rate_hz: float,
+    *,
+    window_s: float = 4.0,
+    hop_s: float = 0.25,
+    minimum_std_ratio: float = 0.05,
+    estimator: str = "fei",
+    data_decimation: int = 1,
+    frequency_decimation: int = 1,
+    decimator: str = "spectral",
+    weight_power: int = 2,
+    window: str = "boxcar",
+    detrend: str = "none",
+    band_hz: tuple[float, float] | None = None,
+) -> MovingTracking:
+    """A(t), d(t) and f_eq(t): `evaluate` on windows of window_s, one every hop_s.
+
+    Windows of W = round(window_s rate) samples start at 0, H, 2H, ... with H = round(hop_s rate); each reading is that of
+    `evaluate` on the window's samples alone, and speaks for the window's centre (start + (W-1)/2) / rate.
+    Where the target's standard deviation in the window is below minimum_std_ratio times that of the whole record, or
+    nothing is left to judge by, `valid` is False and the numbers are NaN.
+
+    Other arguments, shapes, signs and errors as in `evaluate`; SettingError for a window longer than the record.
+    """
+    t, m = _pair(target, measured)
+    settings = Settings(
+        estimator,
+        data_decimation,
+        frequency_decimation,
+        decimator,
+        weight_power,
+        window,
+        detrend,
+        band_hz,
+    )._checked()
+    rate_hz, window_s, hop_s = _number("rate_hz", rate_hz), _number("window_s", window_s), _number("hop_s", hop_s)
+    ratio = _number("minimum_std_ratio", minimum_std_ratio)
+    time_s, *arrays = _each_actuator(
+        t,
+        m,
+        lambda x, y: _core.evaluate_moving(x, y, rate_hz, window_s, hop_s, ratio, *settings._arguments()),
+    )
+    return MovingTracking(
+        time_s if time_s.ndim == 1 else time_s[:, 0], *arrays, window_s, hop_s, ratio, rate_hz, settings
+    )
+
+
+def frequency_response(
+    target: ArrayLike,
+    measured: ArrayLike,
+    rate_hz: float,
+    *,
+    segment_s: float | None = None,
+    overlap: float = 0.5,
+    window: str = "hann",
+    detrend: str = "mean",
+) -> FrequencyResponse:
+    """Gain, phase, delay and coherence of measured over target at every frequency, by Welch's method.
+
+    S_IO = mean of conj(I) O over overlapping windowed segments; gain = |S_IO| / S_II (H1), phase = arg S_IO unwrapped along
+    the delay of the last coherent bin, delay_s = -phase / (2 pi f), coherence = |S_IO|^2 / (S_II S_OO).
+
+    One pair, (n_samples,). segment_s: length of a segment (default: the largest power of two of samples in an eighth of
+    the record), zero-padded to a power of two; overlap: share from 0 to below 1.
+    delay_s > 0: measured lags. Raises SignalError, SettingError.
+    """
+    t, m = _single(target, measured)
+    rate_hz = _number("rate_hz", rate_hz)
+    segment = None if segment_s is None else _number("segment_s", segment_s)
+    share = _number("overlap", overlap)
+    arrays, n_segments, length_s = _core.frequency_response(t, m, rate_hz, segment, share, window, detrend)
+    return FrequencyResponse(*arrays, length_s, share, n_segments, window, detrend, rate_hz)
+
+
+def indices(
+    target: ArrayLike,
+    measured: ArrayLike,
+    rate_hz: float,
+    *,
+    force: ArrayLike | None = None,
+    max_lag_s: float = 0.5,
+) -> Indices:
+    """The time-domain indices of the whole record: MTE, RMS, TI, J1, J2, J3 and, with the force, the energy error.
+
+    MTE = max|O-I|; RMS = sqrt(mean (O-I)^2); TI = (A - TA)/2, see `index_histories`; J1 = lag of the highest Pearson
+    correlation, searched within +-max_lag_s and half the record (the RTHS benchmark searches 0 to 49 samples);
+    J2 = 100 std(O-I)/std(I); J3 = 100 max|O-I|/max|I|. Percentages of MTE and RMS are over max|I| and rms I.
+
+    One pair, (n_samples,); force likewise, in newton for an energy in unit times newton.
+    Lag makes TI and J1 positive. Raises SignalError, SettingError.
+    """
+    t, m = _single(target, measured)
+    f = None if force is None else _samples("force", force)
+    return Indices(*_core.indices(t, m, _number("rate_hz", rate_hz), f, _number("max_lag_s", max_lag_s)))
+
+
+def index_histories(
+    target: ArrayLike, measured: ArrayLike, rate_hz: float, *, force: ArrayLike | None = None
+) -> IndexHistories:
+    """The running indices, at every sample: MTE and RMS so far, tracking indicator, energy error.
+
+    TI = (A - TA)/2 with A_{i+1} = A_i + (I_{i+1}+I_i)(O_{i+1}-O_i)/2 and TA the same with I and O exchanged (Mercan 2007);
+    energy error = sum (F_{i+1}+F_i)/2 ((O-I)_{i+1} - (O-I)_i).
+
+    One pair, (n_samples,). Lag makes TI rise. Raises SignalError.
+    """
+    t, m = _single(target, measured)
+    rate_hz = _number("rate_hz", rate_hz)
+    f = None if force is None else _samples("force", force)
+    return IndexHistories(*_core.index_histories(t, m, rate_hz, f), rate_hz)
