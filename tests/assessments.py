@@ -7,14 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 import scipy.signal
 from numpy.typing import NDArray
 
 from rthstrack.assessment import Assessment, Limits
 from rthstrack.tracking import FrequencyResponse, IndexHistories, Indices, MovingTracking, Settings, Tracking
-
-SHARED = Path(__file__).resolve().parents[2] / "shared"
 
 Signal = NDArray[np.float64]
 
@@ -226,17 +223,9 @@ def parts_of_a_test(limits: Limits | None = None) -> list[Assessment]:
     ]
 
 
-def shared(*parts: str) -> Path:
-    """A file of the shared records; the test that asks for it skips where it is absent."""
-    path = SHARED.joinpath(*parts)
-    if not path.exists():
-        pytest.skip(f"{'/'.join(('../shared', *parts))} is not there")
-    return path
-
-
-def chirp(**options: Any) -> Assessment:
+def chirp(shared: Path, **options: Any) -> Assessment:
     """An open-loop sweep on a real machine, 0-15 Hz, 61,500 samples."""
-    table = np.loadtxt(shared("records", "utfsm_chirp_0A.csv"), delimiter=",", skiprows=1)
+    table = np.loadtxt(shared / "records" / "utfsm_chirp_0A.csv", delimiter=",", skiprows=1)
     return judged(
         np.ascontiguousarray(table[:, 1]),
         np.ascontiguousarray(table[:, 2]),
@@ -251,9 +240,9 @@ def chirp(**options: Any) -> Assessment:
     )
 
 
-def bouc_wen(**options: Any) -> Assessment:
+def bouc_wen(shared: Path, **options: Any) -> Assessment:
     """The paper's nonlinear virtual test on CHY101-N, 92,161 samples."""
-    with np.load(shared("reference", "chy101n_boucwen.npz")) as file:
+    with np.load(shared / "reference" / "chy101n_boucwen.npz") as file:
         target, measured, rate_hz = file["target"], file["measured"], float(file["rate_hz"])
     return judged(target, measured, rate_hz, file="reference/chy101n_boucwen.npz", unit="m", **options)
 

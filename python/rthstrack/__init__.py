@@ -4,7 +4,10 @@ Frequency-domain evaluation of actuator tracking in real-time hybrid simulation,
 """
 
 from rthstrack._core import __version__
+from rthstrack.assessment import Assessment, Limits, assess
 from rthstrack.errors import ChannelError, RecordingError, RthstrackError, SettingError, SignalError
+from rthstrack.recording import Channel, Recording, propose_pair, read_recording
+from rthstrack.report import write_report
 from rthstrack.tracking import (
     Evaluator,
     FrequencyResponse,
@@ -21,12 +24,16 @@ from rthstrack.tracking import (
 )
 
 __all__ = [
+    "Assessment",
+    "Channel",
     "ChannelError",
     "Evaluator",
     "FrequencyResponse",
     "IndexHistories",
     "Indices",
+    "Limits",
     "MovingTracking",
+    "Recording",
     "RecordingError",
     "RthstrackError",
     "SettingError",
@@ -34,9 +41,13 @@ __all__ = [
     "SignalError",
     "Tracking",
     "__version__",
+    "assess",
     "evaluate",
     "evaluate_moving",
     "frequency_response",
     "index_histories",
     "indices",
+    "propose_pair",
+    "read_recording",
+    "write_report",
 ]

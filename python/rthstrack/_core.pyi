@@ -5,7 +5,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Evaluator", "__version__", "evaluate_moving", "frequency_response", "index_histories", "indices"]
+__all__ = ["Evaluator", "__version__", "evaluate_moving", "frequency_response", "index_histories", "indices", "read_text"]
 
 _Numbers = tuple[float, float, float, float, complex]
 _Array = NDArray[np.float64]
@@ -75,3 +75,4 @@ def index_histories(
     rate_hz: float,
     force: NDArray[Any] | None,
 ) -> tuple[_Array, _Array, _Array, _Array | None]: ...
+def read_text(content: bytes) -> dict[str, Any]: ...

@@ -75,14 +75,13 @@ def strongest_span(target: NDArray[np.float64], rate_hz: float, span_s: float = 
 
 
 def judged_range(tracking: Tracking) -> tuple[float, float] | None:
-    """Frequencies (Hz) to show first: those with 99.9 % of the weight and some room on both sides."""
-    if tracking.frequency_hz is None or tracking.weights is None or tracking.frequency_hz.size < 2:
+    """Frequencies (Hz) to show first: those of the middle 98.5 % of the weight, with room on both sides."""
+    frequency, weights = tracking.frequency_hz, tracking.weights
+    if frequency is None or weights is None or frequency.size < 2:
         return None
-    frequency = tracking.frequency_hz
-    share = np.cumsum(tracking.weights)
-    last = frequency.size - 1
-    low = frequency[min(int(np.searchsorted(share, 0.0005)), last)] / 2
-    high = frequency[min(int(np.searchsorted(share, 0.9995)), last)] * 3
+    share = np.cumsum(weights)
+    first, last = np.searchsorted(share, (0.005, 0.99)).clip(max=frequency.size - 1)
+    low, high = frequency[first] / 2, max(frequency[last] * 3, 1.5 * float(tracking.equivalent_frequency_hz))
     return float(max(low, frequency[0])), float(min(high, frequency[-1]))
 
 

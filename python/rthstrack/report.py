@@ -37,22 +37,14 @@ DRAWN_POINTS = 6_000
 NOT_DETERMINED = "not determined"
 
 _INDICES = (
-    # field, name, unit ("unit" stands for the signals' own), factor to the unit shown, what it is
-    ("max_tracking_error", "MTE", "unit", 1.0, "largest |{measured} \N{MINUS SIGN} {target}|"),
-    ("max_tracking_error_percent", "MTE, relative", "%", 1.0, "of the largest |{target}|"),
-    ("rms_error", "RMS error", "unit", 1.0, "root mean square of {measured} \N{MINUS SIGN} {target}"),
-    ("rms_error_percent", "RMS error, relative", "%", 1.0, "of the RMS of {target}"),
-    ("tracking_indicator", "TI", "unit2", 1.0, "tracking indicator at the end; rises on lag, falls on lead"),
-    ("j1_s", "J1", "ms", 1e3, "lag of the correlation peak; positive: {measured} lags"),
-    ("j2_percent", "J2", "%", 1.0, "standard deviation of the error over that of {target}"),
-    ("j3_percent", "J3", "%", 1.0, "peak error over peak {target}"),
-    (
-        "energy_error",
-        "Energy error",
-        "",
-        1.0,
-        "work over {measured} less work over {target}",
-    ),
+    # name, field, unit, factor to the unit shown, field in percent, what it is
+    ("MTE", "max_tracking_error", "unit", 1.0, "max_tracking_error_percent", "of the largest {target}"),
+    ("RMS error", "rms_error", "unit", 1.0, "rms_error_percent", "of the RMS of {target}"),
+    ("TI", "tracking_indicator", "unit2", 1.0, None, "tracking indicator at the end, rises on lag"),
+    ("J1", "j1_s", "ms", 1e3, None, "lag of the correlation peak"),
+    ("J2", "j2_percent", "%", 1.0, None, "standard deviation of the error over that of {target}"),
+    ("J3", "j3_percent", "%", 1.0, None, "peak error over peak {target}"),
+    ("Energy error", "energy_error", "", 1.0, None, "work over {measured} less work over {target}"),
 )
 
 _SETTING_NAMES = {
@@ -242,8 +234,8 @@ def _number(
 ) -> str:
     """A number as text with its unit; the machine-readable value beside it is in the unit of the field's name."""
     if value is None or not math.isfinite(value):
-        why = f" ({escape(reason)})" if reason else ""
-        return f'<span class="muted" data-field="{field}">{NOT_DETERMINED}{why}</span>'
+        why = f' <span class="reason">({escape(reason)})</span>' if reason else ""
+        return f'<span class="absent" data-field="{field}">{NOT_DETERMINED}{why}</span>'
     shown = display.significant(value if isinstance(value, int) else float(value) * factor, digits)
     tail = f'<span class="unit">{"" if unit == "°" else " "}{escape(unit)}</span>' if unit else ""
     exact = value if isinstance(value, int) else repr(float(value))
@@ -340,8 +332,9 @@ def _kept_points(columns: Sequence[NDArray[np.float64]], logarithmic: bool = Fal
     n = columns[0].size
     if n <= DRAWN_POINTS:
         return None
-    edges = display.log_edges if logarithmic else display.even_edges
-    return display.extremes(columns, edges(n, DRAWN_POINTS // (2 * len(columns))))
+    # On a logarithmic axis the groups at low frequencies are single bins, and most curves peak together.
+    edges = display.log_edges(n, DRAWN_POINTS // 2) if logarithmic else display.even_edges(n, DRAWN_POINTS // 6)
+    return display.extremes(columns, edges)
 
 
 def _take(values: NDArray[Any], kept: NDArray[np.intp] | None) -> NDArray[Any]:
@@ -414,7 +407,7 @@ def _histories_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any]:
         "n": n,
         "index": None if kept is None else blocks.column(kept),
         "drawn": n if kept is None else kept.size,
-        "error_label": display.with_unit("Error so far", a.unit),
+        "error_label": display.with_unit("Error", a.unit),
         "indicator_label": f"TI ({a.unit}²)" if a.unit else "TI (unit not stated)",
         **{name: blocks.column(_take(column, kept)) for name, column in columns.items()},
     }
@@ -435,6 +428,7 @@ def _moving_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any] | None:
     return {
         "n": m.time_s.size,
         "drawn": m.time_s.size if kept is None else kept.size,
+        "label": f"windows of {m.window_s:.4g} s",
         "time": blocks.column(_take(a.start_s + m.time_s, kept)),
         "amplitude": blocks.column(_take(amplitude, kept)),
         "delay_s": blocks.column(_take(delay_s, kept)),
@@ -522,7 +516,7 @@ def _summary(assessments: Sequence[Assessment]) -> str:
         "Pair",
         "Amplitude",
         "Delay (ms)",
-        "Equivalent frequency (Hz)",
+        "f_eq (Hz)",
         "RMS error (%)",
     )
     rows = []
@@ -544,7 +538,7 @@ def _summary(assessments: Sequence[Assessment]) -> str:
         rows.append(
             f'<tr data-assessment="{number}"><th scope="row"><a href="#assessment-{number}">{escape(a.file)}</a></th>'
             f"<td>{a.actuator}</td><td>{escape(a.part)}</td>"
-            f"<td>{escape(a.target_name)} → {escape(a.measured_name)}</td>"
+            f'<td class="pair">{escape(a.target_name)} → {escape(a.measured_name)}</td>'
             + "".join(f'<td class="number">{text}</td>' for text in numbers)
             + f"<td>{', '.join(state)}</td></tr>"
         )
@@ -579,7 +573,6 @@ def _section(a: Assessment, drawing: Mapping[str, Any], opening: str, version: s
             _notice("warnings", ("Warning", "Warnings"), a.warnings),
             _time_charts(a, drawing),
             _frequency_charts(a, drawing),
-            _index_charts(drawing),
             _settings_table(a, version, created),
             "</section>",
         )
@@ -593,7 +586,7 @@ def _heading(a: Assessment) -> str:
         escape(a.file),
         f"actuator {a.actuator}" + (f", {what}" if what else ""),
         f"{escape(_signal(target_role, a.target_name))} → {escape(_signal(measured_role, a.measured_name))}",
-        f"{_number('n_samples', int(a.target.size))} samples at {display.significant(a.rate_hz, 6)} Hz",
+        f"{_number('n_samples', int(a.target.size))} samples at {a.rate_hz:.6g} Hz",
     ]
     return (
         f'<p class="facts">{" · ".join(facts)}</p>'
@@ -604,74 +597,65 @@ def _heading(a: Assessment) -> str:
 
 def _key_numbers(a: Assessment) -> str:
     t, reasons = a.tracking, _reasons(a)
-    _, measured_role = display.signal_roles(a.part)
-    target_role, _ = display.signal_roles(a.part)
-    delay = float(t.delay_s)
-    sense = f"{measured_role} {'lags' if delay > 0 else 'leads'}" if math.isfinite(delay) and delay != 0 else ""
+    target_role, measured_role = display.signal_roles(a.part)
+    amplitude, delay_s = float(t.amplitude), float(t.delay_s)
+    phase, f_eq = float(t.phase_rad), float(t.equivalent_frequency_hz)
+    sense = "" if not delay_s else f"{measured_role} {'lags' if delay_s > 0 else 'leads'}"
     large = (
-        ("Amplitude A", _number("amplitude", float(t.amplitude), reason=reasons.get("amplitude")), "1 is perfect"),
-        ("Delay d", _number("delay_s", delay, "ms", 1e3, reasons.get("delay_s")), sense),
+        (
+            "Amplitude A",
+            _number("amplitude", amplitude, reason=reasons.get("amplitude")),
+            "1 is perfect",
+            _limit("limit_amplitude", "1 \N{PLUS-MINUS SIGN} ", abs(amplitude - 1), a.limits.amplitude),
+        ),
+        (
+            "Delay d",
+            _number("delay_s", delay_s, "ms", 1e3, reasons.get("delay_s")),
+            sense if math.isfinite(delay_s) else "",
+            _limit("limit_delay_s", "\N{PLUS-MINUS SIGN}", abs(delay_s), a.limits.delay_s, "ms", 1e3),
+        ),
         (
             "Phase",
-            _number("phase_rad", float(t.phase_rad), "°", 180 / math.pi, reasons.get("phase_rad")),
+            _number("phase_rad", phase, "\N{DEGREE SIGN}", 180 / math.pi, reasons.get("phase_rad")),
             "negative on lag",
+            "",
         ),
         (
             "Equivalent frequency",
-            _number(
-                "equivalent_frequency_hz",
-                float(t.equivalent_frequency_hz),
-                "Hz",
-                reason=reasons.get("equivalent_frequency_hz"),
-            ),
-            f"from {_number('n_bins', int(t.n_bins))} bins, {_number('delta_f_hz', float(t.delta_f_hz), 'Hz')} apart",
+            _number("equivalent_frequency_hz", f_eq, "Hz", reason=reasons.get("equivalent_frequency_hz")),
+            f"{_number('n_bins', int(t.n_bins))} bins, {_number('delta_f_hz', float(t.delta_f_hz), 'Hz')} apart",
+            "",
         ),
     )
-    tiles = "".join(f"<div><dt>{name}</dt><dd>{value}<small>{note}</small></dd></div>" for name, value, note in large)
-    return (
-        f'<dl class="tiles">{tiles}</dl><div class="columns">'
-        f"{_limit_table(a)}{_index_table(a, target_role, measured_role, reasons)}</div>"
+    tiles = "".join(
+        f"<div><dt>{name}</dt><dd>{value}<small>{note}</small>{limit}</dd></div>" for name, value, note, limit in large
     )
+    return f'<dl class="tiles">{tiles}</dl>{_index_tiles(a, target_role, measured_role, reasons)}'
 
 
-def _limit_table(a: Assessment) -> str:
-    t, rows = a.tracking, []
-    for field, name, value, limit, unit, factor in (
-        ("limit_delay_s", "|d|", abs(float(t.delay_s)), a.limits.delay_s, "ms", 1e3),
-        ("limit_amplitude", "|A \N{MINUS SIGN} 1|", abs(float(t.amplitude) - 1), a.limits.amplitude, "", 1.0),
-    ):
-        if limit is None:
-            continue
-        if math.isfinite(value):
-            over = value > limit
-            state = '<strong class="exceeded">exceeded</strong>' if over else "within"
-            shown = f"{display.significant(value * factor)} {unit}"
-        else:
-            state, shown = NOT_DETERMINED, NOT_DETERMINED
-        rows.append(
-            f'<tr><th scope="row">{name}</th><td class="number">{shown}</td>'
-            f'<td class="number">{_number(field, limit, unit, factor)}</td>'
-            f'<td data-field="{field}_state">{state}</td></tr>'
-        )
-    if not rows:
-        return '<div><h3>Limits</h3><p class="muted">None were set.</p></div>'
-    return (
-        '<div><h3>Limits</h3><table><thead><tr><th></th><th scope="col" class="number">found</th>'
-        f'<th scope="col" class="number">allowed</th><th></th></tr></thead><tbody>{"".join(rows)}</tbody></table></div>'
-    )
+def _limit(field: str, sign: str, found: float, limit: float | None, unit: str = "", factor: float = 1.0) -> str:
+    if limit is None:
+        return ""
+    if not math.isfinite(found):
+        state = NOT_DETERMINED
+    elif found > limit:
+        state = '<strong class="exceeded">\N{BLACK UP-POINTING TRIANGLE} exceeded</strong>'
+    else:
+        state = "kept"
+    allowed = f'<data data-field="{field}" value="{limit!r}">{limit * factor:.4g}{" " if unit else ""}{unit}</data>'
+    return f'<small>limit {sign}{allowed}: <span data-field="{field}_state">{state}</span></small>'
 
 
-def _index_table(a: Assessment, target_role: str, measured_role: str, reasons: Mapping[str, str]) -> str:
+def _index_tiles(a: Assessment, target_role: str, measured_role: str, reasons: Mapping[str, str]) -> str:
     units = {"unit": a.unit or "", "unit2": f"{a.unit}²" if a.unit else ""}
-    rows = []
-    for field, name, unit, factor, meaning in _INDICES:
-        value = getattr(a.indices, field)
-        text = meaning.format(target=target_role, measured=measured_role)
-        shown = _number(field, value, units.get(unit, unit), factor, reasons.get(field))
-        rows.append(
-            f'<tr><th scope="row">{name}</th><td class="number">{shown}</td><td class="muted">{escape(text)}</td></tr>'
-        )
-    return f"<div><h3>Indices in the time domain</h3><table><tbody>{''.join(rows)}</tbody></table></div>"
+    tiles = []
+    for name, field, unit, factor, percent, meaning in _INDICES:
+        value = _number(field, getattr(a.indices, field), units.get(unit, unit), factor, reasons.get(field))
+        note = meaning.format(target=target_role, measured=measured_role)
+        if percent is not None:
+            note = f"{_number(percent, getattr(a.indices, percent), '%', reason=reasons.get(percent))} {note}"
+        tiles.append(f"<div><dt>{name}</dt><dd>{value}<small>{note}</small></dd></div>")
+    return f'<dl class="tiles indices">{"".join(tiles)}</dl>'
 
 
 def _notice(field: str, heads: tuple[str, str], texts: Sequence[str]) -> str:
@@ -693,10 +677,7 @@ def _thinned(drawing: Mapping[str, Any], points: str) -> str:
     """What a caption says where not every point is drawn."""
     if drawing["drawn"] >= drawing["n"]:
         return ""
-    return (
-        f' <span class="thinned">{drawing["drawn"]} of {drawing["n"]} {points} are drawn: the extremes of every group '
-        "of neighbours. The numbers use all.</span>"
-    )
+    return f' <span class="thinned">Drawn: {drawing["drawn"]} of {drawing["n"]} {points}, extremes kept.</span>'
 
 
 def _time_charts(a: Assessment, drawing: Mapping[str, Any]) -> str:
@@ -707,13 +688,16 @@ def _time_charts(a: Assessment, drawing: Mapping[str, Any]) -> str:
     else:
         m = a.moving
         text = (
-            f"{int(np.count_nonzero(m.valid))} of {m.time_s.size} windows of {display.significant(m.window_s)} s "
-            f"judged, one every {display.significant(m.hop_s)} s, drawn at the window's centre. Grey: {target_role} "
+            f"{int(np.count_nonzero(m.valid))} of {m.time_s.size} windows of {m.window_s:.4g} s "
+            f"judged, one every {m.hop_s:.4g} s, drawn at the window's centre. Grey: {target_role} "
             "moves too little in the window to judge by (standard deviation below "
             f"{m.minimum_std_ratio:.3g} of the record's)."
         )
         moving = _chart("moving-amplitude", "Amplitude over time")
         moving += _chart("moving-delay", "Delay over time", text + _thinned(drawing["moving"], "windows"))
+    histories = drawing["histories"]
+    energy = _chart("energy", "Energy error over time") if "energy_error" in histories else ""
+    note = _thinned(histories, "samples")
     return (
         '<section class="charts"><div class="head"><h3>Over time</h3><div class="views" data-views="time"></div>'
         '<p class="hint">Drag to zoom, double click to go back. Keys: \N{LEFTWARDS ARROW} \N{RIGHTWARDS ARROW} '
@@ -721,62 +705,48 @@ def _time_charts(a: Assessment, drawing: Mapping[str, Any]) -> str:
         '<div class="with-loop"><div>'
         + _chart("history", f"{target_role} and {measured_role} over time")
         + _chart("error", f"{measured_role} less {target_role} over time", _thinned(drawing["time"], "samples"))
-        + "</div>"
+        + f"{moving}</div><div>"
         + _chart(
             "loop",
             f"{measured_role} against {target_role}",
             f"{measured_role.capitalize()} against {target_role}, over the time shown. Dashed: perfect tracking. "
             "The loop opens by lag or lead; its slope is the amplitude.",
         )
-        + f"</div>{moving}</section>"
+        + _chart("running-errors", "Largest error and RMS error so far")
+        + _chart("indicator", "Tracking indicator over time", f"TI rises while {measured_role} lags.{note}")
+        + f"{energy}</div></div></section>"
     )
 
 
 def _frequency_charts(a: Assessment, drawing: Mapping[str, Any]) -> str:
-    parts = []
+    left = right = ""
     if drawing["spectrum"] is not None:
-        parts.append(_chart("spectra", "Amplitude spectra", _thinned(drawing["spectrum"], "bins")))
-        parts.append(
-            _chart(
-                "weights",
-                "Weights of the evaluation over frequency",
-                "The share of each bin in the evaluation; all together make one.",
-            )
+        left = _chart("spectra", "Amplitude spectra") + _chart(
+            "weights",
+            "Weights of the evaluation over frequency",
+            "The share of each bin in the evaluation; all together make 1." + _thinned(drawing["spectrum"], "bins"),
         )
     if drawing["response"] is not None and a.response is not None:
         r = a.response
         text = (
-            f"Welch's method: {r.n_segments} segments of {display.significant(r.segment_s)} s, {escape(r.window)} "
+            f"Welch's method: {r.n_segments} segments of {r.segment_s:.4g} s, {escape(r.window)} "
             f"window. Grey: coherence below {display.LOW_COHERENCE}, not to be relied on. Dotted: A and d of the "
             "evaluation."
         )
-        parts.append(_chart("gain", "Gain over frequency"))
-        parts.append(_chart("delay", "Delay over frequency"))
-        parts.append(_chart("coherence", "Coherence over frequency", text + _thinned(drawing["response"], "bins")))
+        right = _chart("gain", "Gain over frequency") + _chart("delay", "Delay over frequency")
+        right += _chart("coherence", "Coherence over frequency", text + _thinned(drawing["response"], "bins"))
     else:
         reason = a.response_note or "there is no frequency above zero"
-        parts.append(
+        right = (
             f'<p class="absent" data-field="response">Gain, delay and coherence over frequency {NOT_DETERMINED}: '
             f"{escape(reason)}</p>"
         )
+    views = ""
+    if drawing["frequency"] is not None:
+        views = '<div class="views" data-views="frequency"></div><p class="hint">Shaded: outside what was judged.</p>'
     return (
-        '<section class="charts"><div class="head"><h3>Over frequency</h3>'
-        '<div class="views" data-views="frequency"></div>'
-        '<p class="hint">Shaded: outside what was judged.</p></div>'
-        f'<div class="pairs">{"".join(parts)}</div></section>'
-    )
-
-
-def _index_charts(drawing: Mapping[str, Any]) -> str:
-    histories = drawing["histories"]
-    energy = _chart("energy", "Energy error over time") if "energy_error" in histories else ""
-    return (
-        '<section class="charts"><div class="head"><h3>Indices over time</h3>'
-        '<p class="hint">Their last values are those of the whole record. The time shown is that of the charts above.'
-        '</p></div><div class="pairs">'
-        + _chart("running-errors", "Largest error and RMS error so far", _thinned(histories, "samples"))
-        + _chart("indicator", "Tracking indicator over time", "TI rises while the measured signal lags.")
-        + f"{energy}</div></section>"
+        f'<section class="charts"><div class="head"><h3>Over frequency</h3>{views}</div>'
+        f'<div class="pairs"><div>{left}</div><div>{right}</div></div></section>'
     )
 
 
@@ -784,19 +754,19 @@ def _settings_table(a: Assessment, version: str, created: datetime) -> str:
     settings = {**dataclasses.asdict(a.tracking.settings), **a.settings}
     rows = [
         ("file", "File", a.file),
-        ("start_s", "Start of the evaluated part", f"{display.significant(a.start_s, 6)} s"),
-        ("duration_s", "Duration", f"{display.significant(a.target.size / a.rate_hz, 6)} s"),
+        ("start_s", "Start of the evaluated part", f"{a.start_s:.6g} s"),
+        ("duration_s", "Duration", f"{a.target.size / a.rate_hz:.6g} s"),
         ("unit", "Unit", a.unit or "not stated"),
     ]
     rows += [(name, *_setting(name, value)) for name, value in _flat(settings)]
     if a.moving is not None:
         m = a.moving
-        text = f"{display.significant(m.window_s)} s, one every {display.significant(m.hop_s)} s, {m.settings.window}"
+        text = f"{m.window_s:.4g} s, one every {m.hop_s:.4g} s, {m.settings.window}"
         rows.append(("moving", "Moving window", text))
     if a.response is not None:
         r = a.response
         text = (
-            f"Welch, {r.n_segments} segments of {display.significant(r.segment_s)} s, overlap {r.overlap:g}, "
+            f"Welch, {r.n_segments} segments of {r.segment_s:.4g} s, overlap {r.overlap:g}, "
             f"{r.window}, detrend {r.detrend}"
         )
         rows.append(("response", "Frequency response", text))
@@ -811,8 +781,8 @@ def _settings_table(a: Assessment, version: str, created: datetime) -> str:
 def _footer() -> str:
     return """<footer><h2>Signs and words</h2>
 <p>A delay above zero means that the measured signal <em>lags</em> the target (its phase is then negative); below zero
-it leads. Amplitude is measured over target; 1 is perfect. The evaluation is the frequency-domain one of Guo, Chen, Xu and
-Sanchez (2014), Smart Mater. Struct. 23 045042: one complex gain, the mean of measured over target with the weights
+it leads. Amplitude is measured over target; 1 is perfect. The evaluation is the frequency-domain one of Guo, Chen, Xu
+and Sanchez (2014), Smart Mater. Struct. 23 045042: one complex gain, the mean of measured over target with the weights
 |target|<sup>l</sup>, gives the amplitude A and the phase; the delay is d = \N{MINUS SIGN}phase / (2π f_eq) at the
 equivalent frequency f_eq, the mean frequency with the same weights.</p>
 <p class="muted">Numbers here have four significant digits; the block <code>results</code> in the source of this page

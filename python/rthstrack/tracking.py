@@ -38,7 +38,9 @@ class _Result:
         try:
             import pandas as pd
         except ImportError:
-            raise RthstrackError("to_frame needs pandas, which is not installed: pip install 'rthstrack[pandas]'") from None
+            raise RthstrackError(
+                "to_frame needs pandas, which is not installed: pip install 'rthstrack[pandas]'"
+            ) from None
         return pd.DataFrame(self._columns())
 
     def _columns(self) -> dict[str, Any]:
@@ -134,9 +136,7 @@ def _samples(name: str, samples: ArrayLike) -> NDArray[np.float64]:
             raise SignalError(f"{name} must hold real numbers, not {array.dtype}")
         array = np.ascontiguousarray(array, dtype=np.float64)
     if array.ndim not in (1, 2):
-        raise SignalError(
-            f"{name} must have the shape (n_samples,) or (n_samples, n_actuators), not {array.shape}"
-        )
+        raise SignalError(f"{name} must have the shape (n_samples,) or (n_samples, n_actuators), not {array.shape}")
     return array
 
 
@@ -193,7 +193,12 @@ class Tracking(_Result):
             name: np.atleast_1d(getattr(self, name))
             for name in ("amplitude", "phase_rad", "delay_s", "equivalent_frequency_hz", "fei")
         }
-        same = {"n_bins": self.n_bins, "delta_f_hz": self.delta_f_hz, "rate_hz": self.rate_hz, "n_samples": self.n_samples}
+        same = {
+            "n_bins": self.n_bins,
+            "delta_f_hz": self.delta_f_hz,
+            "rate_hz": self.rate_hz,
+            "n_samples": self.n_samples,
+        }
         n = len(numbers["amplitude"])
         settings = {key: [value] * n for key, value in dataclasses.asdict(self.settings).items()}
         return {"actuator": np.arange(n)} | numbers | {key: [value] * n for key, value in same.items()} | settings
@@ -486,8 +491,8 @@ def frequency_response(
 ) -> FrequencyResponse:
     """Gain, phase, delay and coherence of measured over target at every frequency, by Welch's method.
 
-    S_IO = mean of conj(I) O over overlapping windowed segments; gain = |S_IO| / S_II (H1), phase = arg S_IO unwrapped along
-    the delay of the last coherent bin, delay_s = -phase / (2 pi f), coherence = |S_IO|^2 / (S_II S_OO).
+    S_IO = mean of conj(I) O over overlapping windowed segments; gain = |S_IO| / S_II (H1), phase = arg S_IO unwrapped
+    along the delay of the last coherent bin, delay_s = -phase / (2 pi f), coherence = |S_IO|^2 / (S_II S_OO).
 
     One pair, (n_samples,). segment_s: length of a segment (default: the largest power of two of samples in an eighth of
     the record), zero-padded to a power of two; overlap: share from 0 to below 1.
@@ -528,8 +533,8 @@ def index_histories(
 ) -> IndexHistories:
     """The running indices, at every sample: MTE and RMS so far, tracking indicator, energy error.
 
-    TI = (A - TA)/2 with A_{i+1} = A_i + (I_{i+1}+I_i)(O_{i+1}-O_i)/2 and TA the same with I and O exchanged (Mercan 2007);
-    energy error = sum (F_{i+1}+F_i)/2 ((O-I)_{i+1} - (O-I)_i).
+    TI = (A - TA)/2 with A_{i+1} = A_i + (I_{i+1}+I_i)(O_{i+1}-O_i)/2 and TA the same with I and O exchanged (Mercan
+    2007); energy error = sum (F_{i+1}+F_i)/2 ((O-I)_{i+1} - (O-I)_i).
 
     One pair, (n_samples,). Lag makes TI rise. Raises SignalError.
     """

@@ -21,6 +21,7 @@
 use std::f64::consts::PI;
 
 use num_complex::Complex;
+use pulp::Simd;
 
 use crate::error::{Error, Result};
 
@@ -31,6 +32,10 @@ pub const ALIAS_DB: f64 = 200.0;
 const MAX_HALVINGS: usize = 3;
 /// Width of the accumulators, whatever the processor: fixes the order of the additions.
 const LANES: usize = 8;
+/// Vectors in flight, to cover the latency of the additions.
+const IN_FLIGHT: usize = 8;
+/// Samples that these take at most.
+const MAX_BLOCK: usize = IN_FLIGHT * LANES;
 /// Below this many points a transform is cheaper than another pass.
 const SHORTEST: usize = 256;
 
@@ -144,14 +149,14 @@ impl Pass {
 
     /// Length of the buffer that [`Pass::run`] reads: the sequence with its wrapped ends, and room for the last block.
     fn padded_len(&self, n: usize) -> usize {
-        n + self.groups.len() * self.factor + 2 * LANES * BLOCKS
+        n + self.groups.len() * self.factor + 2 * MAX_BLOCK
     }
 
     /// y[m] = sum_j h[j] x[(factor m + j - reach) mod n] for m = 0 .. n / factor.
     ///
     /// `padded` holds x from index `reach` on; of x only `[0, filled)` may differ from zero.
     #[inline(always)]
-    fn run(&self, padded: &mut [f64], n: usize, filled: usize, out: &mut [f64]) {
+    fn run<S: Simd>(&self, simd: S, padded: &mut [f64], n: usize, filled: usize, out: &mut [f64]) {
         let n_out = n / self.factor;
         let (before, from) = (self.reach, self.reach + n);
         // The circle: what precedes sample 0 and what follows sample n - 1.
@@ -164,51 +169,68 @@ impl Pass {
         let quiet_from = (filled + self.reach).div_ceil(self.factor);
         let quiet_to = (n - self.reach.min(n)) / self.factor;
         if quiet_from + LANES < quiet_to {
-            self.outputs(padded, out, 0, quiet_from);
+            self.outputs(simd, padded, out, 0, quiet_from);
             out[quiet_from..quiet_to].fill(0.0);
-            self.outputs(padded, out, quiet_to, n_out);
+            self.outputs(simd, padded, out, quiet_to, n_out);
         } else {
-            self.outputs(padded, out, 0, n_out);
+            self.outputs(simd, padded, out, 0, n_out);
         }
     }
 
     /// The outputs `[from, to)`.
     #[inline(always)]
-    fn outputs(&self, padded: &[f64], out: &mut [f64], from: usize, to: usize) {
+    fn outputs<S: Simd>(&self, simd: S, padded: &[f64], out: &mut [f64], from: usize, to: usize) {
         match self.factor {
-            2 => self.outputs_by::<2>(padded, out, from, to),
-            4 => self.outputs_by::<4>(padded, out, from, to),
-            _ => self.outputs_by::<8>(padded, out, from, to),
+            2 => self.outputs_by::<S, 2>(simd, padded, out, from, to),
+            4 => self.outputs_by::<S, 4>(simd, padded, out, from, to),
+            _ => self.outputs_by::<S, 8>(simd, padded, out, from, to),
         }
     }
 
     #[inline(always)]
-    fn outputs_by<const D: usize>(&self, padded: &[f64], out: &mut [f64], from: usize, to: usize) {
-        let per_block = BLOCKS * LANES / D;
-        let mut m = from;
-        while m < to {
-            let mut acc = [[0.0f64; LANES]; BLOCKS];
-            let start = D * m;
-            let span = &padded[start..start + D * (self.groups.len() - 1) + BLOCKS * LANES];
-            for (a, taps) in self.groups.iter().enumerate() {
-                let x = &span[D * a..D * a + BLOCKS * LANES];
-                for b in 0..BLOCKS {
-                    for lane in 0..LANES {
-                        acc[b][lane] += taps[lane] * x[b * LANES + lane];
+    fn outputs_by<S: Simd, const D: usize>(&self, simd: S, padded: &[f64], out: &mut [f64], from: usize, to: usize) {
+        const STRIP: usize = 16;
+        // The lanes go through memory before they are summed: else the compiler shapes the products after the sums.
+        let mut lanes = [0.0f64; MAX_BLOCK * STRIP];
+        let block = IN_FLIGHT * S::F64_LANES.min(LANES);
+        let per_block = block / D;
+        for m in (from..to).step_by(STRIP * per_block) {
+            let strip = &mut out[m..to.min(m + STRIP * per_block)];
+            let blocks = strip.len().div_ceil(per_block);
+            let (sums, _) = S::as_mut_simd_f64s(&mut lanes);
+            for (b, sums) in sums.chunks_exact_mut(IN_FLIGHT).take(blocks).enumerate() {
+                let start = D * m + b * block;
+                let x = &padded[start..start + D * (self.groups.len() - 1) + block];
+                let mut acc = [simd.splat_f64s(0.0); IN_FLIGHT];
+                for (a, taps) in self.groups.iter().enumerate() {
+                    let (taps, _) = S::as_simd_f64s(taps);
+                    let (x, _) = S::as_simd_f64s(&x[D * a..D * a + block]);
+                    for v in 0..IN_FLIGHT {
+                        acc[v] = simd.mul_add_e_f64s(taps[v % taps.len()], x[v], acc[v]);
                     }
                 }
+                sums.copy_from_slice(&acc);
             }
-            let flat: &[f64] = acc.as_flattened();
-            for (y, part) in out[m..to.min(m + per_block)].iter_mut().zip(flat.chunks_exact(D)) {
-                *y = part.iter().sum();
+            for (y, part) in strip.iter_mut().zip(lanes.chunks_exact(D)) {
+                *y = sum_by_halves::<D>(part);
             }
-            m += per_block;
         }
     }
 }
 
-/// Accumulators in flight, to cover the latency of the additions.
-const BLOCKS: usize = 4;
+/// Sum of D lanes as a tree, which vectorises and rounds less than a chain.
+#[inline(always)]
+fn sum_by_halves<const D: usize>(lanes: &[f64]) -> f64 {
+    let mut sums: [f64; D] = std::array::from_fn(|i| lanes[i]);
+    let mut width = D;
+    while width > 1 {
+        width /= 2;
+        for i in 0..width {
+            sums[i] += sums[i + width];
+        }
+    }
+    sums[0]
+}
 
 /// The passes that bring a circular record of `n` points down to `n / factor`, with their droop.
 #[derive(Debug, Clone)]
@@ -267,17 +289,17 @@ impl Cascade {
 
     /// Shortens `input` (laid out as [`Cascade::input_layout`] says; `filled` samples of it may be non-zero) into `out`.
     #[inline(always)]
-    pub(crate) fn run(&self, input: &mut [f64], filled: usize, scratch: &mut [f64], out: &mut [f64]) {
+    pub(crate) fn run<S: Simd>(&self, simd: S, input: &mut [f64], filled: usize, scratch: &mut [f64], out: &mut [f64]) {
         let (mut n, mut filled) = (self.n, filled);
         let mut input = input;
         let mut rest = scratch;
         for (i, pass) in self.passes.iter().enumerate() {
             let n_out = n / pass.factor;
             match self.passes.get(i + 1) {
-                None => pass.run(input, n, filled, &mut out[..n_out]),
+                None => pass.run(simd, input, n, filled, &mut out[..n_out]),
                 Some(next) => {
                     let (padded, after) = std::mem::take(&mut rest).split_at_mut(next.padded_len(n_out));
-                    pass.run(input, n, filled, &mut padded[next.reach..next.reach + n_out]);
+                    pass.run(simd, input, n, filled, &mut padded[next.reach..next.reach + n_out]);
                     (input, rest) = (padded, after);
                 }
             }

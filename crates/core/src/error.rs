@@ -132,10 +132,9 @@ pub enum Error {
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Error::Length { signal, expected, found } => write!(
-                f,
-                "{signal} has {found} samples but target has {expected}: both must cover the same samples"
-            ),
+            Error::Length { signal, expected, found } => {
+                write!(f, "{signal} has {found} samples but target has {expected}: both must cover the same samples")
+            }
             Error::TooShort { expected, found } => {
                 write!(f, "{found} samples are too few: at least {expected} are needed")
             }
@@ -154,16 +153,20 @@ impl fmt::Display for Error {
                 "target's magnitudes (peak {peak:e}) raised to the weight power {weight_power} leave the range of double \
                  precision: rescale the channels or lower the weight power"
             ),
-            Error::NoEnergy => write!(
-                f,
-                "target has no energy at the bins that are kept: widen the band or lower P and Q"
-            ),
-            Error::Rate { found } => write!(f, "rate_hz must be a positive finite number, not {found}"),
+            Error::NoEnergy => {
+                write!(f, "target has no energy at the bins that are kept: widen the band or lower P and Q")
+            }
+            Error::Rate { found } => {
+                write!(f, "rate_hz must be a positive finite number, not {found}")
+            }
             Error::NotPowerOfTwo { name, found } => {
                 write!(f, "{name} must be a power of two (1, 2, 4, ...), not {found}")
             }
             Error::NoBin { fft_len, data_decimation, frequency_decimation, available_hz, band_hz } => {
-                write!(f, "no frequency bin is left: P = {data_decimation} and Q = {frequency_decimation} on {fft_len} points ")?;
+                write!(
+                    f,
+                    "no frequency bin is left: P = {data_decimation} and Q = {frequency_decimation} on {fft_len} points "
+                )?;
                 if available_hz.0.is_finite() {
                     write!(f, "keep {} to {} Hz", available_hz.0, available_hz.1)?;
                     if let Some((low, high)) = band_hz {
@@ -174,10 +177,9 @@ impl fmt::Display for Error {
                     write!(f, "keep nothing; P times Q must be at most {}", fft_len / 2)
                 }
             }
-            Error::Band { low_hz, high_hz } => write!(
-                f,
-                "band_hz must be two finite frequencies 0 <= low <= high, not ({low_hz}, {high_hz})"
-            ),
+            Error::Band { low_hz, high_hz } => {
+                write!(f, "band_hz must be two finite frequencies 0 <= low <= high, not ({low_hz}, {high_hz})")
+            }
             Error::WeightPower { found } => {
                 write!(f, "weight_power must be a whole number from 1 to 16, not {found}")
             }

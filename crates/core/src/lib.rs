@@ -16,6 +16,8 @@
 //!
 //! Signs: a positive delay means that measured lags target; amplitude 1 is perfect. Units are SI.
 
+#![forbid(unsafe_code)]
+
 pub mod decimate;
 pub mod error;
 pub mod indices;

@@ -74,7 +74,9 @@ pub(crate) fn check_rate(rate_hz: f64) -> Result<()> {
 
 /// Refuses NaN and infinity, naming how many and where the first is.
 pub(crate) fn check_finite(samples: &[f64], signal: Signal) -> Result<()> {
-    let Some(first) = samples.iter().position(|v| !v.is_finite()) else { return Ok(()) };
+    let Some(first) = samples.iter().position(|v| !v.is_finite()) else {
+        return Ok(());
+    };
     let count = samples[first..].iter().filter(|v| !v.is_finite()).count();
     Err(Error::NotFinite { signal, count, first })
 }

@@ -74,7 +74,11 @@ pub fn frequency_response(pair: &Pair<'_>, config: &ResponseConfig) -> Result<Fr
     }
     let overlap = config.overlap;
     if !(0.0..1.0).contains(&overlap) {
-        return Err(Error::Setting { name: "overlap", expected: "a share from 0 to below 1".to_owned(), found: overlap });
+        return Err(Error::Setting {
+            name: "overlap",
+            expected: "a share from 0 to below 1".to_owned(),
+            found: overlap,
+        });
     }
     let segment = match config.segment_s {
         None => (1usize << (n / 8).max(1).ilog2()).max(MIN_SEGMENT),

@@ -12,6 +12,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use num_complex::Complex;
+use pulp::{Arch, NullaryFnOnce, Simd, WithSimd};
 use rustfft::{Fft, FftPlanner};
 
 use crate::decimate::Cascade;
@@ -20,6 +21,9 @@ use crate::window::{Detrend, Window};
 
 /// Lanes in which bins are unpacked and summed.
 pub(crate) const LANES: usize = 4;
+
+/// Bytes of a cache line.
+const ALIGNMENT: usize = 64;
 
 /// What decides which bins are kept and how a record becomes bins.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,6 +49,7 @@ pub(crate) struct Spectrum {
     /// First and last kept bin of the folded transform.
     first: usize,
     last: usize,
+    arch: Arch,
 }
 
 /// Buffers of one evaluation: the packed transforms of both signals and the scratch between.
@@ -110,11 +115,8 @@ impl Spectrum {
             cascade,
             first,
             last,
+            arch: Arch::new(),
         })
-    }
-
-    pub(crate) fn config(&self) -> &SpectrumConfig {
-        &self.config
     }
 
     /// n, the length of the zero-padded record.
@@ -148,7 +150,8 @@ impl Spectrum {
         let half = self.cascade.out_len() / 2;
         let zero = Complex::new(0.0, 0.0);
         let (_, input_len) = self.cascade.input_layout();
-        let input_len = if self.cascade.is_empty() { 0 } else { input_len.div_ceil(2) };
+        let input_len =
+            if self.cascade.is_empty() { 0 } else { (input_len + ALIGNMENT / size_of::<f64>()).div_ceil(2) };
         SpectrumState {
             target: vec![zero; half],
             measured: vec![zero; half],
@@ -158,26 +161,36 @@ impl Spectrum {
     }
 
     /// Transforms both signals into the state's packed buffers.
-    #[inline(always)]
     pub(crate) fn transform(&self, state: &mut SpectrumState, target: &[f64], measured: &[f64]) {
         let SpectrumState { target: target_bins, measured: measured_bins, scratch, passes } = state;
         for (samples, bins) in [(target, target_bins), (measured, measured_bins)] {
-            self.shorten(samples, bytemuck::cast_slice_mut(bins), scratch, passes);
+            let shorten = Shorten { plan: self, samples, out: bytemuck::cast_slice_mut(bins), scratch, passes };
+            self.arch.dispatch(shorten);
             self.fft.process_with_scratch(bins, scratch);
         }
     }
 
     /// Detrends, windows, zero-pads, folds and decimates one signal into `out`.
     #[inline(always)]
-    fn shorten(&self, samples: &[f64], out: &mut [f64], scratch: &mut [Complex<f64>], passes: &mut [f64]) {
+    fn shorten<S: Simd>(
+        &self,
+        simd: S,
+        samples: &[f64],
+        out: &mut [f64],
+        scratch: &mut [Complex<f64>],
+        passes: &mut [f64],
+    ) {
         if self.cascade.is_empty() {
             self.fold(samples, out);
             return;
         }
         let (start, len) = self.cascade.input_layout();
-        let input = &mut bytemuck::cast_slice_mut(scratch)[..len];
+        let input: &mut [f64] = bytemuck::cast_slice_mut(scratch);
+        // On a cache line's start no load of the cascade straddles two.
+        let skip = input.as_ptr().align_offset(ALIGNMENT).min(ALIGNMENT / size_of::<f64>());
+        let input = &mut input[skip..skip + len];
         self.fold(samples, &mut input[start..start + self.folded_len]);
-        self.cascade.run(input, samples.len().min(self.folded_len), passes, out);
+        self.cascade.run(simd, input, samples.len().min(self.folded_len), passes, out);
     }
 
     /// out[i] = sum over blocks of (w x)[i + block * n / Q], zero past the last sample.
@@ -226,9 +239,43 @@ impl Spectrum {
     }
 
     /// Hands every kept bin to `sink`, some in groups of [`LANES`] neighbours, in no particular order.
-    #[inline(always)]
     pub(crate) fn visit<S: Sink>(&self, state: &SpectrumState, sink: &mut S) {
-        self.unpack.visit(&state.target, &state.measured, self.first, self.last, sink);
+        self.arch.dispatch(Visit { plan: self, state, sink });
+    }
+}
+
+/// [`Spectrum::shorten`] compiled for the processor at hand. (A closure would not be inlined into the dispatch.)
+struct Shorten<'a> {
+    plan: &'a Spectrum,
+    samples: &'a [f64],
+    out: &'a mut [f64],
+    scratch: &'a mut [Complex<f64>],
+    passes: &'a mut [f64],
+}
+
+impl WithSimd for Shorten<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        self.plan.shorten(simd, self.samples, self.out, self.scratch, self.passes);
+    }
+}
+
+/// [`Unpack::visit`] compiled for the processor at hand.
+struct Visit<'a, S> {
+    plan: &'a Spectrum,
+    state: &'a SpectrumState,
+    sink: &'a mut S,
+}
+
+impl<S: Sink> NullaryFnOnce for Visit<'_, S> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Spectrum { unpack, first, last, .. } = self.plan;
+        unpack.visit(&self.state.target, &self.state.measured, *first, *last, self.sink);
     }
 }
 
@@ -267,11 +314,7 @@ impl Unpack {
     fn new(half: usize) -> Self {
         let twiddle = |k: usize| Complex::from_polar(1.0, -PI * k as f64 / half as f64);
         let groups = (half / 2).saturating_sub(1) / LANES;
-        Self {
-            half,
-            coarse: (0..groups).map(|g| twiddle(1 + g * LANES)).collect(),
-            fine: std::array::from_fn(twiddle),
-        }
+        Self { half, coarse: (0..groups).map(|g| twiddle(1 + g * LANES)).collect(), fine: std::array::from_fn(twiddle) }
     }
 
     /// Bin `k` alone, 0 <= k <= H.

@@ -3,7 +3,6 @@
 use std::f64::consts::PI;
 
 use num_complex::Complex;
-use pulp::Arch;
 
 use crate::decimate::{Chebyshev, Decimator};
 use crate::error::{Error, Result};
@@ -116,7 +115,6 @@ pub struct Evaluator {
     chebyshev: Option<Chebyshev>,
     spectrum: Spectrum,
     droop: Option<Vec<f64>>,
-    arch: Arch,
 }
 
 /// What changes during an evaluation: its buffers. Make one a thread.
@@ -163,7 +161,7 @@ impl Evaluator {
             band_hz: config.band_hz,
         })?;
         let droop = spectrum.droop();
-        Ok(Self { config, n_samples, rate_hz, chebyshev, spectrum, droop, arch: Arch::new() })
+        Ok(Self { config, n_samples, rate_hz, chebyshev, spectrum, droop })
     }
 
     /// The settings.
@@ -258,28 +256,20 @@ impl Evaluator {
             }
             None => (pair.target(), pair.measured()),
         };
-        self.arch.dispatch(
-            #[inline(always)]
-            || self.spectrum.transform(spectrum, target, measured),
-        );
+        self.spectrum.transform(spectrum, target, measured);
         Ok(())
     }
 
     fn sum(&self, state: &SpectrumState) -> Sums {
-        self.arch.dispatch(
-            #[inline(always)]
-            || match (self.config.weight_power, &self.droop) {
-                (2, None) => self.sum_with(state, Weigh::<2, false>::new(&[], 0)),
-                (2, Some(droop)) => self.sum_with(state, Weigh::<2, true>::new(droop, self.spectrum.first())),
-                (power, None) => self.sum_with(state, Weigh::<0, false>::with_power(&[], 0, power)),
-                (power, Some(droop)) => {
-                    self.sum_with(state, Weigh::<0, true>::with_power(droop, self.spectrum.first(), power))
-                }
-            },
-        )
+        let (first, power) = (self.spectrum.first(), self.config.weight_power);
+        match (power, &self.droop) {
+            (2, None) => self.sum_with(state, Weigh::<2, false>::new(&[], 0, 2)),
+            (2, Some(droop)) => self.sum_with(state, Weigh::<2, true>::new(droop, first, 2)),
+            (_, None) => self.sum_with(state, Weigh::<0, false>::new(&[], 0, power)),
+            (_, Some(droop)) => self.sum_with(state, Weigh::<0, true>::new(droop, first, power)),
+        }
     }
 
-    #[inline(always)]
     fn sum_with<const L: u32, const DROOP: bool>(&self, state: &SpectrumState, mut weigh: Weigh<'_, L, DROOP>) -> Sums {
         self.spectrum.visit(state, &mut weigh);
         weigh.sums()
@@ -363,11 +353,7 @@ struct Weigh<'a, const L: u32, const DROOP: bool> {
 }
 
 impl<'a, const L: u32, const DROOP: bool> Weigh<'a, L, DROOP> {
-    fn new(droop: &'a [f64], first: usize) -> Self {
-        Self::with_power(droop, first, L)
-    }
-
-    fn with_power(droop: &'a [f64], first: usize, weight_power: u32) -> Self {
+    fn new(droop: &'a [f64], first: usize, weight_power: u32) -> Self {
         let zero = [0.0; LANES];
         Self { droop, first, weight_power, re: zero, im: zero, power: zero, moment: zero, energy: zero }
     }
@@ -447,8 +433,7 @@ impl Moving<'_> {
     /// The reading of the window that starts at sample `start`.
     pub(crate) fn at(&mut self, start: usize) -> Result<Tracking> {
         let range = start..start + self.evaluator.n_samples;
-        let window =
-            Pair::new(&self.pair.target()[range.clone()], &self.pair.measured()[range], self.pair.rate_hz())?;
+        let window = Pair::new(&self.pair.target()[range.clone()], &self.pair.measured()[range], self.pair.rate_hz())?;
         self.evaluator.evaluate(&mut self.state, &window)
     }
 }

@@ -7,6 +7,7 @@ mod indices;
 mod moving;
 mod response;
 mod signal;
+mod text;
 mod tracking;
 
 #[pymodule]
@@ -17,5 +18,6 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(response::frequency_response, m)?)?;
     m.add_function(wrap_pyfunction!(indices::indices, m)?)?;
     m.add_function(wrap_pyfunction!(indices::index_histories, m)?)?;
+    text::register(m)?;
     Ok(())
 }

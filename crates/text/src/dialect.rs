@@ -142,7 +142,8 @@ fn judge(lines: &[&[u8]], delimiter: Delimiter, point: u8) -> Option<(f64, Diale
     }
     let (n_columns, score) = by_count.into_iter().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))?;
     let mut counts = vec![[0.0f64; 3]; n_columns];
-    let (mut n_rows, mut share_sum) = (0, 0.0);
+    let (mut n_rows, mut share_sum) = (0usize, 0.0);
+    let n_below = lines.len() - rows.iter().position(|row| row.0 == n_columns).unwrap_or(0);
     let mut decided = None;
     let mut customary = None;
     for (line, (n_fields, weight, share)) in lines.iter().zip(rows) {
@@ -167,8 +168,8 @@ fn judge(lines: &[&[u8]], delimiter: Delimiter, point: u8) -> Option<(f64, Diale
             column += 1;
         });
     }
-    // A row of a table is numbers for a good part; prose with a number in it is not.
-    if share_sum < 0.25 * f64::from(n_rows) {
+    // A row of a table is numbers for a good part, and other rows follow; prose with a number in it is neither.
+    if share_sum < 0.25 * n_rows as f64 || 4 * n_rows < n_below {
         return None;
     }
     let kinds: Vec<Kind> = counts
@@ -234,7 +235,8 @@ mod tests {
 
     #[test]
     fn a_date_with_blanks_is_one_field() {
-        let dialect = find(b"1, 05/25/2022 05:46:08.066 PM, 0.5, go\n2, 05/25/2022 05:46:08.067 PM, 0.6, on\n").unwrap();
+        let dialect =
+            find(b"1, 05/25/2022 05:46:08.066 PM, 0.5, go\n2, 05/25/2022 05:46:08.067 PM, 0.6, on\n").unwrap();
         assert_eq!(dialect.kinds, [Kind::Number, Kind::Stamp, Kind::Number, Kind::Text]);
         assert_eq!(dialect.n_required(), 3);
     }

@@ -74,10 +74,9 @@ impl fmt::Display for TextError {
                 f,
                 "not a text file: byte 0x{byte:02x} at offset {offset}; expected lines of numbers, found binary content"
             ),
-            Self::Utf16 { offset } => write!(
-                f,
-                "damaged UTF-16 text: half a character at byte offset {offset}; save the file again as UTF-8"
-            ),
+            Self::Utf16 { offset } => {
+                write!(f, "damaged UTF-16 text: half a character at byte offset {offset}; save the file again as UTF-8")
+            }
             Self::NoNumbers { n_lines } => write!(
                 f,
                 "no rows of numbers in {n_lines} line(s) of text; expected columns separated by comma, semicolon, tab, '|' or spaces"

@@ -85,9 +85,8 @@ fn no_names(closest: Option<Row>, data: &HeadLine<'_>, dialect: &Dialect) -> Res
     if is_names && n_names < n_fields && dialect.delimiter != Delimiter::Blanks {
         return Err(TextError::Names { line: row.number, n_names, data_line: data.number, n_fields });
     }
-    let note = (n_names > 1).then(|| {
-        format!("line {}: {n_names} words above {n_fields} columns were not taken as names", row.number)
-    });
+    let note = (n_names > 1)
+        .then(|| format!("line {}: {n_names} words above {n_fields} columns were not taken as names", row.number));
     Ok(Header { note, ..Header::default() })
 }
 
@@ -265,10 +264,11 @@ fn is_statement(line: &[u8]) -> bool {
 /// Whether a cell is the name of a unit, or anything in brackets.
 fn is_unit(cell: &str) -> bool {
     const UNITS: [&str; 66] = [
-        "-", "--", "1", "s", "sec", "secs", "second", "seconds", "ms", "msec", "us", "µs", "min", "h", "hz", "khz", "m",
-        "mm", "cm", "um", "µm", "nm", "in", "inch", "ft", "n", "kn", "mn", "lbf", "lb", "kip", "kips", "g", "gal", "gn",
-        "m/s", "mm/s", "cm/s", "in/s", "m/s2", "m/s^2", "m/s²", "m/s/s", "mm/s2", "mm/s^2", "cm/s2", "cm/s^2", "v", "mv",
-        "a", "ma", "%", "deg", "rad", "°", "°c", "degc", "c", "pa", "kpa", "mpa", "bar", "psi", "nm", "knm", "um/m",
+        "-", "--", "1", "s", "sec", "secs", "second", "seconds", "ms", "msec", "us", "µs", "min", "h", "hz", "khz",
+        "m", "mm", "cm", "um", "µm", "nm", "in", "inch", "ft", "n", "kn", "mn", "lbf", "lb", "kip", "kips", "g", "gal",
+        "gn", "m/s", "mm/s", "cm/s", "in/s", "m/s2", "m/s^2", "m/s²", "m/s/s", "mm/s2", "mm/s^2", "cm/s2", "cm/s^2",
+        "v", "mv", "a", "ma", "%", "deg", "rad", "°", "°c", "degc", "c", "pa", "kpa", "mpa", "bar", "psi", "nm", "knm",
+        "um/m",
     ];
     let bracketed = |open, close| cell.starts_with(open) && cell.ends_with(close);
     bracketed('(', ')') || bracketed('[', ']') || UNITS.contains(&cell.to_lowercase().as_str())

@@ -289,10 +289,7 @@ mod tests {
         assert_eq!(decided_order(b"25/05/2022"), Some(Order::DayFirst));
         assert_eq!(decided_order(b"05/06/2022"), None);
         assert_eq!(customary_order(b"05.06.2022"), Order::DayFirst);
-        assert_eq!(
-            parse(b"25.05.2022", Order::DayFirst),
-            Some(Stamp { day: Some(19137), ns: None })
-        );
+        assert_eq!(parse(b"25.05.2022", Order::DayFirst), Some(Stamp { day: Some(19137), ns: None }));
     }
 
     #[test]

@@ -54,17 +54,20 @@ const Charts = (() => {
     return signed(value.toFixed(Math.max(digits - 1 - power, 0)));
   }
 
+  /* A number without the zeros that say nothing: 15, 0.9, 1.25. */
+  const short = (value) => signed(String(Number(value.toPrecision(4))));
+
   /* Tick labels, all with the decimals that their spacing needs. */
   function tickLabels(u, ticks) {
     const shown = ticks.filter((t) => t != null);
     const largest = Math.max(...shown.map(Math.abs));
-    const step = shown.length > 1 ? Math.abs(shown[1] - shown[0]) : largest || 1;
-    const power = Math.floor(Math.log10(step) + 1e-9);
-    const far = largest >= 1e5 || power < -4;
-    const scale = far ? 10 ** Math.floor(Math.log10(largest)) : 1;
-    const places = Math.max(0, far ? Math.floor(Math.log10(largest)) - power : -power);
-    const tail = far ? `×10${raised(Math.log10(scale).toFixed(0))}` : "";
-    return ticks.map((t) => (t == null ? null : t === 0 ? "0" : signed((t / scale).toFixed(places)) + tail));
+    if (!(largest > 0)) return ticks.map((t) => (t == null ? null : "0"));
+    const power = largest >= 1e5 || largest < 1e-3 ? Math.floor(Math.log10(largest)) : 0;
+    const step = (shown.length > 1 ? Math.abs(shown[1] - shown[0]) : largest) / 10 ** power;
+    let places = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+    while (places < 12 && Math.abs(step * 10 ** places - Math.round(step * 10 ** places)) > 1e-6) places++;
+    const tail = power ? `×10${raised(power)}` : "";
+    return ticks.map((t) => (t == null ? null : t === 0 ? "0" : signed((t / 10 ** power).toFixed(places)) + tail));
   }
 
   function logLabel(t) {
@@ -202,9 +205,9 @@ const Charts = (() => {
     });
   }
 
-  function level(ctx, box, y, style, dash, ratio, width = 1) {
+  function level(ctx, box, y, style, dash, ratio) {
     ctx.strokeStyle = style;
-    ctx.lineWidth = width * ratio;
+    ctx.lineWidth = 1.25 * ratio;
     ctx.setLineDash(dash.map((d) => d * ratio));
     ctx.beginPath();
     ctx.moveTo(box.left, y);
@@ -213,27 +216,38 @@ const Charts = (() => {
     ctx.setLineDash([]);
   }
 
-  /* references: what is ideal or the summary, dotted; limits: what is allowed, dashed, told even when out of view. */
-  function drawLevels(u, references, limits) {
+  /* A level's label: above its line, or below where there is no room above. */
+  function beside(u, ctx, box, ratio, value, label, edge, style) {
+    const y = u.valToPos(value, "y", true);
+    const below = y - box.top < 16 * ratio;
+    const x = edge === "left" ? box.left + 5 * ratio : box.left + box.width - 4 * ratio;
+    write(ctx, label, x, y + (below ? 4 : -3) * ratio, edge, below ? "top" : "bottom", style);
+  }
+
+  /* references: what is ideal, or the summary; dotted and behind the curves. */
+  function drawReferences(u, references) {
+    clipped(u, (ctx, box, ratio) => {
+      for (const { value } of references) level(ctx, box, u.valToPos(value, "y", true), colour.muted, [1.5, 3], ratio);
+    });
+  }
+
+  /* limits: what is allowed; dashed, and told even when out of view. The labels of both, above everything. */
+  function drawLimits(u, references, limits) {
     clipped(u, (ctx, box, ratio) => {
       const right = box.left + box.width - 4 * ratio;
       const { min, max } = u.scales.y;
+      for (const { value } of limits) level(ctx, box, u.valToPos(value, "y", true), colour.limit, [7, 4], ratio);
       for (const { value, label } of references) {
-        if (value < min || value > max) continue;
-        const y = u.valToPos(value, "y", true);
-        level(ctx, box, y, colour.muted, [1.5, 3], ratio, 1.25);
-        if (label) write(ctx, label, box.left + 5 * ratio, y - 3 * ratio, "left", "bottom", colour.muted);
+        if (!label || value < min || value > max) continue;
+        beside(u, ctx, box, ratio, value, label, "left", colour.muted);
       }
       for (const { value, label } of limits) {
-        if (value >= min && value <= max) {
-          const y = u.valToPos(value, "y", true);
-          const low = y - box.top < 16 * ratio;
-          level(ctx, box, y, colour.limit, [7, 4], ratio, 1.25);
-          write(ctx, label, right, y + (low ? 3 : -3) * ratio, "right", low ? "top" : "bottom", colour.limit);
-        } else if (value > max) {
+        if (value > max) {
           write(ctx, `▲ ${label}`, right, box.top + 3 * ratio, "right", "top", colour.limit);
-        } else {
+        } else if (value < min) {
           write(ctx, `▼ ${label}`, right, box.top + box.height - 3 * ratio, "right", "bottom", colour.limit);
+        } else {
+          beside(u, ctx, box, ratio, value, label, "right", colour.limit);
         }
       }
     });
@@ -276,6 +290,8 @@ const Charts = (() => {
         if (value > max && value - min < 5 * span) max = value;
         if (value < min && max - value < 5 * span) min = value;
       }
+      const short = (o.y.least || 0) - (max - min);
+      if (short > 0) [min, max] = [min - short / 2, max + short / 2];
       const air = max > min ? 0.07 * (max - min) : Math.abs(max) * 0.1 || 1;
       return [o.y.zero ? Math.min(0, min) : min - air, max + air];
     };
@@ -290,9 +306,10 @@ const Charts = (() => {
   }
 
   /* Curves over one horizontal axis.
-   *   x: {label, unit, group}   y: {label, unit, log, decades, zero, fixed, include}   height
+   *   x: {label, unit, group}   y: {label, unit, log, decades, zero, fixed, include, least}   height
+   *     log with at most so many decades; from zero; a fixed range; values to include; the least span shown
    *   data: [x, y1, y2, ...], null where there is no value
-   *   series: [{label, colour, width, dash, fill, unit, auto, silent}]   colour: a name of COLOURS
+   *   series: [{label, colour, swatch, width, dash, fill, unit, auto, silent}]   colour: a name of COLOURS
    *   intervals: [[upper, lower]] pairs of series (from 1) with the area between them filled
    *   references, limits: [{value, label}]   marks: [{at, label}]   shades: [{from, to}]
    * The lists may be changed later; chart.redraw(false, true) shows it. chart.setData(data) for new data. */
@@ -305,7 +322,7 @@ const Charts = (() => {
     o.marks = o.marks || [];
     o.shades = o.shades || [];
     const xScale = { time: false, distr: log ? 3 : 1, range: (u, min, max) => [min, max] };
-    if (linked) Object.assign(xScale, { auto: false, min: linked.min, max: linked.max });
+    if (linked) xScale.auto = false;
     const live = (name, unit) => (u, v) => (v == null ? "" : `${number(v)}${unit ? ` ${unit}` : ""}`);
     const options = {
       width: Math.max(host.clientWidth, 200),
@@ -339,9 +356,12 @@ const Charts = (() => {
       },
       hooks: {
         drawClear: [(u) => drawShades(u, o.shades)],
-        drawAxes: [(u) => drawLevels(u, o.references, [])],
-        draw: [(u) => { drawLevels(u, [], o.limits); drawMarks(u, o.marks); }],
-        setScale: [(u, key) => { if (linked && key === "x") linked.set(u.scales.x.min, u.scales.x.max); }],
+        drawAxes: [(u) => drawReferences(u, o.references)],
+        draw: [(u) => { drawMarks(u, o.marks); drawLimits(u, o.references, o.limits); }],
+        setScale: [(u, key) => {
+          if (linked && key === "x" && linked.members.has(u)) linked.set(u.scales.x.min, u.scales.x.max);
+        }],
+        setLegend: [(u) => host.classList.toggle("hovered", u.cursor.idx != null)],
       },
     };
     const u = new uPlot(options, o.data, host);
@@ -352,13 +372,14 @@ const Charts = (() => {
     chart.setData = (data) => u.setData(data, !linked);
     chart.linked = linked;
     if (linked) {
+      u.setScale("x", { min: linked.min, max: linked.max });
       linked.members.add(u);
       keyboard(host, linked);
     }
     return chart;
   }
 
-  const swatch = (o, i) => `var(--chart-${o.series[i - 1].colour})`;
+  const swatch = (o, i) => `var(--chart-${o.series[i - 1].swatch || o.series[i - 1].colour})`;
 
   /* A single value between two gaps draws no line, so it gets a point. */
   function lonely(u, i, shown) {
@@ -479,5 +500,5 @@ const Charts = (() => {
     return chart;
   }
 
-  return { group, lines, loop, number };
+  return { group, lines, loop, number, short };
 })();

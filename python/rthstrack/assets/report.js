@@ -96,17 +96,17 @@
     const x = column(m.time);
     const shades = m.invalid.map(([from, to]) => ({ from, to }));
     Charts.lines(host("moving-amplitude"), {
-      x: axis, y: { label: "Amplitude A (-)" }, height: 190, shades, data: [x, gaps(column(m.amplitude))],
+      x: axis, y: { label: "Amplitude A (-)", least: 0.02 }, height: 190, shades, data: [x, gaps(column(m.amplitude))],
       references: [{ value: 1 }, { value: a.amplitude, label: "whole record" }],
-      limits: limitPair(a.limits.amplitude, 1, (v) => Charts.number(v)),
-      series: [{ label: "A", colour: "value", width: 1.5 }],
+      limits: limitPair(a.limits.amplitude, 1, Charts.short),
+      series: [{ label: `amplitude, ${m.label}`, colour: "value", width: 1.5 }],
     });
     Charts.lines(host("moving-delay"), {
-      x: axis, y: { label: "Delay d (ms)", unit: "ms" }, height: 190, shades,
+      x: axis, y: { label: "Delay d (ms)", unit: "ms", least: 0.5 }, height: 190, shades,
       data: [x, gaps(column(m.delay_s), 1e3)],
       references: [{ value: 0 }, { value: a.delay_s * 1e3, label: "whole record" }],
-      limits: limitPair(a.limits.delay_s == null ? null : a.limits.delay_s * 1e3, 0, (v) => `${Charts.number(v)} ms`),
-      series: [{ label: "d", colour: "value", width: 1.5 }],
+      limits: limitPair(a.limits.delay_s == null ? null : a.limits.delay_s * 1e3, 0, (v) => `${Charts.short(v)} ms`),
+      series: [{ label: `delay, ${m.label}`, colour: "value", width: 1.5 }],
     });
   }
 
@@ -117,7 +117,7 @@
     Charts.lines(host("running-errors"), {
       x: axis, y: { label: h.error_label, unit: a.unit, zero: true }, height: 170,
       data: [x, gaps(column(h.max_tracking_error)), gaps(column(h.rms_error))],
-      series: [{ label: "maximum so far (MTE)", colour: "error" }, { label: "RMS so far", colour: "third", width: 1.5 }],
+      series: [{ label: "MTE so far", colour: "error" }, { label: "RMS so far", colour: "third", width: 1.5 }],
     });
     Charts.lines(host("indicator"), {
       x: axis, y: { label: h.indicator_label, unit: squared }, height: 170,
@@ -148,12 +148,12 @@
     if (s) {
       const x = column(s.frequency);
       Charts.lines(host("spectra"), {
-        x: axis, y: { label: s.label, unit: s.unit, log: true, decades: 6 }, height: 240, marks, shades,
+        x: axis, y: { label: s.label, unit: s.unit, log: true, decades: 6 }, height: 290, marks, shades,
         data: [x, positive(column(s.target)), positive(column(s.measured))],
         series: [{ label: a.time.target_label, colour: "target" }, { label: a.time.measured_label, colour: "measured" }],
       });
       Charts.lines(host("weights"), {
-        x: axis, y: { label: "Weight of a bin (-)", zero: true }, height: 240, marks: bare, shades,
+        x: axis, y: { label: "Weight of a bin (-)", zero: true }, height: 220, marks: bare, shades,
         data: [x, gaps(column(s.weights))], series: [{ label: "weight w", colour: "second", width: 1.5 }],
       });
     }
@@ -163,25 +163,25 @@
     const coherence = column(r.coherence);
     const sure = coherence.map((c) => (c >= r.low_coherence ? 1 : 0));
     const any = sure.some((v) => v);
-    const curve = (name, label, unit, values, references, limits) => Charts.lines(host(name), {
-      x: axis, y: { label, unit }, height: 210, marks: bare, shades, references, limits,
+    const curve = (name, label, unit, least, values, references, limits) => Charts.lines(host(name), {
+      x: axis, y: { label, unit, least }, height: 180, marks: bare, shades, references, limits,
       data: [x, gaps(values), where(values, sure)],
       series: [
-        { label: name, colour: "doubtful", auto: !any },
+        { label: name, colour: "doubtful", swatch: "value", auto: !any },
         { label: name, colour: "value", width: 1.75, silent: true },
       ],
     });
-    curve("gain", "Gain (-)", "", column(r.gain),
-      [{ value: 1 }, { value: a.amplitude, label: "A" }], limitPair(a.limits.amplitude, 1, (v) => Charts.number(v)));
-    curve("delay", "Delay (ms)", "ms", column(r.delay_s).map((d) => d * 1e3),
+    curve("gain", "Gain (-)", "", 0.02, column(r.gain),
+      [{ value: 1 }, { value: a.amplitude, label: "A" }], limitPair(a.limits.amplitude, 1, Charts.short));
+    curve("delay", "Delay (ms)", "ms", 0.5, column(r.delay_s).map((d) => d * 1e3),
       [{ value: 0 }, { value: a.delay_s * 1e3, label: "d" }],
-      limitPair(a.limits.delay_s == null ? null : a.limits.delay_s * 1e3, 0, (v) => `${Charts.number(v)} ms`));
+      limitPair(a.limits.delay_s == null ? null : a.limits.delay_s * 1e3, 0, (v) => `${Charts.short(v)} ms`));
     Charts.lines(host("coherence"), {
       x: axis, y: { label: "Coherence (-)", fixed: [0, 1.05] }, height: 150, marks: bare, shades,
-      references: [{ value: r.low_coherence, label: `${r.low_coherence}` }],
+      references: [{ value: r.low_coherence, label: Charts.short(r.low_coherence) }],
       data: [x, gaps(coherence), where(coherence, sure)],
       series: [
-        { label: "coherence", colour: "doubtful" },
+        { label: "coherence", colour: "doubtful", swatch: "value" },
         { label: "coherence", colour: "value", width: 1.75, silent: true },
       ],
     });

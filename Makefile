@@ -1,0 +1,142 @@
+# Everything that is done with rthstrack, in one place. Needed: Python 3.11 or newer, a Rust toolchain with its linker.
+SHELL := bash
+.SHELLFLAGS := -euo pipefail -c
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.NOTPARALLEL:
+MAKEFLAGS += --no-builtin-rules --no-print-directory
+
+PYTHON ?= python3
+BIN := .venv/bin
+OUT := build
+# One interpreter for every cargo command: with another, cargo would build the bindings anew each time.
+export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
+export MPLBACKEND := Agg
+
+RUST_SOURCES := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml $(wildcard Cargo.lock) pyproject.toml
+ifeq (,$(wildcard python/rthstrack/_core.*))
+BUILT_STAMP_IS_STALE := $(shell rm -f .venv/built)
+endif
+
+say = @printf '\n\033[1m== %s\033[0m\n' "$(1)"
+# cargo succeeds when a filter leaves nothing to run; this does not.
+ran_some = awk '/^test result: ok/ {n += $$4} END {if (n == 0) {print "make: no test ran in $(1)"; exit 1}; print n " passed"}' $(1)
+
+.PHONY: help
+help: ## this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+.PHONY: setup
+setup: .venv/built ## the virtual environment, with the package built into it
+
+.PHONY: demo
+demo: .venv/built ## evaluates a record of a test: printed verdict and HTML report
+	@$(BIN)/python examples/demo.py
+
+.PHONY: test
+test: lint test-rust test-stubs test-doctests test-examples test-python ## every check; what continuous integration runs
+
+.PHONY: lint
+lint: .venv/ready toolchain ## formatting, lints and types of Rust and Python
+	$(call say,format and lints: Rust)
+	@cargo fmt --all --check
+	@cargo clippy --workspace --all-targets --locked --quiet -- -D warnings
+	$(call say,format and lints: Python)
+	@$(BIN)/ruff check
+	@$(BIN)/ruff format --check
+	@$(BIN)/mypy -p rthstrack
+	@$(BIN)/mypy --strict reference/*.py
+
+.PHONY: test-rust
+test-rust: .venv/ready toolchain ## Rust tests and doctests
+	$(call say,Rust tests)
+	@mkdir -p $(OUT)
+	@cargo test --workspace --locked --quiet --lib --bins --tests 2>&1 | tee $(OUT)/rust-tests.log
+	@$(call ran_some,$(OUT)/rust-tests.log)
+	$(call say,Rust doctests)
+	@cargo test --workspace --locked --quiet --doc 2>&1 | tee $(OUT)/rust-doctests.log
+	@$(call ran_some,$(OUT)/rust-doctests.log)
+
+.PHONY: test-stubs
+test-stubs: .venv/built ## the stub of the compiled module against the module
+	$(call say,stub of rthstrack._core)
+	@$(BIN)/python -m mypy.stubtest rthstrack._core
+
+.PHONY: test-doctests
+test-doctests: .venv/built ## examples in Python docstrings
+	$(call say,Python doctests)
+	@$(BIN)/pytest --doctest-modules python/rthstrack
+
+.PHONY: test-examples
+test-examples: .venv/built ## every file of examples/, run as it is
+	$(call say,examples)
+	@mkdir -p $(OUT)/examples; root=$$PWD; n=0; \
+	for file in examples/*.py; do \
+		[ -e "$$file" ] || continue; \
+		echo "$$file"; \
+		(cd $(OUT)/examples && "$$root/$(BIN)/python" -W error "$$root/$$file" > "$$(basename "$$file" .py).log"); \
+		n=$$((n + 1)); \
+	done; \
+	[ $$n -gt 0 ] || { echo "make: there is no file in examples/"; exit 1; }; \
+	echo "$$n run"
+
+.PHONY: test-python
+test-python: .venv/built ## Python tests; browser tests where there is a Chromium
+	$(call say,Python tests)
+	@command -v chromium || command -v chromium-browser || command -v google-chrome \
+		|| echo "NO CHROMIUM FOUND: the browser tests will be skipped (Debian: apt-get install chromium)"
+	@$(BIN)/pytest
+
+.PHONY: fuzz
+fuzz: .venv/built toolchain ## the fuzz tests at length: 200,000 inputs each
+	$(call say,fuzz tests)
+	@mkdir -p $(OUT)
+	@RTHSTRACK_FUZZ=200000 cargo test --workspace --locked --release fuzz 2>&1 | tee $(OUT)/fuzz.log
+	@$(call ran_some,$(OUT)/fuzz.log)
+	@RTHSTRACK_FUZZ=200000 $(BIN)/pytest -k fuzz
+
+.PHONY: bench
+bench: .venv/built ## benchmark beside SciPy; writes docs/benchmarks.md
+	@$(BIN)/python benchmarks/bench.py
+
+.PHONY: docs
+docs: .venv/ready toolchain ## documentation of the Rust core, in target/doc
+	@RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
+
+.PHONY: golden
+golden: .venv/ready ## writes tests/golden anew from the NumPy twin
+	@$(BIN)/python reference/make_golden.py
+
+.PHONY: format
+format: .venv/ready toolchain ## formats Rust and Python
+	@cargo fmt --all
+	@$(BIN)/ruff format
+	@$(BIN)/ruff check --fix
+
+.PHONY: clean
+clean: ## removes whatever was built, the virtual environment too
+	@rm -rf .venv target $(OUT) out .mypy_cache .pytest_cache .ruff_cache .hypothesis python/rthstrack/_core.*so
+
+.PHONY: toolchain
+toolchain:
+	@for tool in "" fmt clippy; do \
+		cargo $$tool --version > /dev/null 2>&1 || { \
+			echo "make: 'cargo $$tool' does not run: a Rust toolchain with rustfmt and clippy is needed (https://rustup.rs)"; \
+			exit 1; \
+		}; \
+	done
+
+.venv/ready: constraints.txt
+	@command -v $(PYTHON) > /dev/null || { echo "make: $(PYTHON) not found: Python 3.11 or newer is needed"; exit 1; }
+	@$(PYTHON) -c 'import sys; v = sys.version_info; \
+		sys.exit(f"make: $(PYTHON) is Python {v[0]}.{v[1]}: 3.11 or newer is needed (make PYTHON=...)" if v < (3, 11) else 0)'
+	@$(BIN)/python -m pip --version > /dev/null 2>&1 || $(PYTHON) -m venv .venv \
+		|| { echo "make: '$(PYTHON) -m venv .venv' failed (Debian: apt-get install python3-venv)"; exit 1; }
+	$(call say,virtual environment)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --requirement constraints.txt
+	@touch $@
+
+.venv/built: .venv/ready $(RUST_SOURCES) | toolchain
+	$(call say,building rthstrack._core)
+	@VIRTUAL_ENV="$(CURDIR)/.venv" $(BIN)/maturin develop --release --locked --quiet
+	@touch $@

@@ -1,0 +1,44 @@
+"""The command `rthstrack`: one file a subcommand, each with `add_parser` and `run`."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from typing import TYPE_CHECKING
+
+from rthstrack._core import __version__
+from rthstrack.cli import channels, evaluate
+from rthstrack.errors import RthstrackError, SettingError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+MISUSE = 2
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs the command line and returns the exit status: 0 done, 1 some file failed, 2 misuse, 3 a limit was exceeded."""
+    parser = argparse.ArgumentParser(
+        prog="rthstrack",
+        description="Did the actuator do what the simulation asked? Gain and delay of actuator tracking.",
+    )
+    parser.add_argument("--version", action="version", version=f"rthstrack {__version__}")
+    subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for command in (evaluate, channels):
+        command.add_parser(subparsers)
+    args = parser.parse_args(argv)
+    try:
+        status: int = args.run(args)
+        sys.stdout.flush()
+        return status
+    except RthstrackError as error:
+        print(f"rthstrack: {error}", file=sys.stderr)
+        return MISUSE if isinstance(error, SettingError) else 1
+    except BrokenPipeError:
+        # Whoever read the output has had enough; nothing more may be written, not even at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except KeyboardInterrupt:
+        print("rthstrack: interrupted", file=sys.stderr)
+        return 130

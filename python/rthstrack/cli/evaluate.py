@@ -1,0 +1,519 @@
+"""`rthstrack evaluate FILE...`: file in, verdict out."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import dataclasses
+import json
+import math
+import os
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rthstrack.assessment import Assessment, Limits, assess
+from rthstrack.errors import RecordingError, RthstrackError, SettingError, SignalError
+from rthstrack.recording import Recording, propose_pair, read_recording
+from rthstrack.tracking import Settings
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from rich.console import Console
+
+FAILED, EXCEEDED = 1, 3
+_FIGURES = (".png", ".pdf", ".svg")
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Adds the command to the command line."""
+    parser = subparsers.add_parser(
+        "evaluate",
+        help="judge how measured followed target in recorded tests",
+        description="Judges how well the measured displacement followed the target, in amplitude and in time "
+        "(Guo, Xu and Chen 2014). A positive delay means that measured lags. "
+        "Exit status: 0 everything was evaluated, 1 some file failed, 2 misuse, 3 a limit was exceeded.",
+    )
+    parser.add_argument(
+        "files", nargs="+", metavar="FILE", help="recorded test: text, MATLAB, HDF5, TDMS, Parquet, NumPy"
+    )
+    signals = parser.add_argument_group("signals (a channel is named by name, path or #index)")
+    signals.add_argument("--target", action="append", metavar="T", help="what the model asks; repeat with --measured")
+    signals.add_argument("--measured", action="append", metavar="M", help="what the sensor says, one for each --target")
+    signals.add_argument("--command", action="append", metavar="C", help="what compensation sends: judged apart")
+    signals.add_argument(
+        "--scale", action="append", type=_scale, default=[], metavar="CHANNEL=X", help="multiply a channel"
+    )
+    rate = signals.add_mutually_exclusive_group()
+    rate.add_argument("--rate", type=_positive, metavar="HZ", help="sampling rate, where the file does not say")
+    rate.add_argument("--time", metavar="T", help="channel that holds the time")
+    signals.add_argument("--start", type=_not_negative, metavar="S", help="leave out what comes before, in seconds")
+    signals.add_argument("--end", type=_positive, metavar="S", help="leave out what comes after, in seconds")
+    signals.add_argument("--fill", type=_count, metavar="SAMPLES", help="interpolate gaps of up to so many samples")
+    signals.add_argument(
+        "--resample", type=_positive, metavar="HZ", help="interpolate uneven time stamps onto this rate"
+    )
+    method = parser.add_argument_group("evaluation")
+    method.add_argument("--estimator", choices=("fei",), default="fei", help="default: fei, the published one")
+    method.add_argument("-P", type=_power_of_two, default=1, metavar="N", help="data decimation, a power of two")
+    method.add_argument("-Q", type=_power_of_two, default=1, metavar="N", help="frequency decimation, a power of two")
+    method.add_argument("--decimator", choices=("spectral", "chebyshev"), default="spectral", metavar="D",
+                        help="how P is done: spectral (default) or chebyshev, as published")  # fmt: skip
+    method.add_argument("--weight-power", type=_weight_power, default=2, metavar="L", help="bins weigh |target|^L (2)")
+    windows = ("boxcar", "hann", "hamming", "blackman", "flattop", "tukey")
+    method.add_argument("--window", choices=windows, default="boxcar", metavar="W", help=f"one of {', '.join(windows)}")
+    method.add_argument("--detrend", choices=("none", "mean", "linear"), default="none", metavar="D",
+                        help="none (default), mean or linear")  # fmt: skip
+    method.add_argument("--band", nargs=2, type=_not_negative, metavar=("LO", "HI"), help="frequencies judged, in Hz")
+    method.add_argument("--moving", type=_positive, metavar="S", help="length of a moving window (4 s)")
+    method.add_argument("--hop", type=_positive, metavar="S", help="from one moving window to the next")
+    limits = parser.add_argument_group("limits")
+    limits.add_argument("--limit-delay", type=_positive, metavar="S", help="largest |delay| allowed, in seconds")
+    limits.add_argument("--limit-amplitude", type=_positive, metavar="X", help="largest |amplitude - 1| allowed")
+    output = parser.add_argument_group("output")
+    output.add_argument("--json", action="store_true", help="print JSON instead of text")
+    output.add_argument("--report", type=_path(".html", ".htm"), metavar="OUT.html", help="write an interactive report")
+    output.add_argument(
+        "--figure", type=_path(*_FIGURES), metavar="OUT.png|pdf|svg", help="write a figure for a journal"
+    )
+    output.add_argument("--csv", type=_path(".csv"), metavar="OUT.csv",
+                        help="write a row a result; with --moving also the readings, to OUT_moving.csv")  # fmt: skip
+    parser.set_defaults(run=lambda args: run(args, parser.error))
+
+
+def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
+    """Evaluates the files; returns the exit status."""
+    _check(args, misuse)
+    results, failures = _evaluate_all(args)
+    assessments = [a for found in results for a in found]
+    notes = _write_outputs(args, assessments)
+    if args.json:
+        document = {
+            "results": [result_entry(a) for a in assessments],
+            "failures": [{"file": file, "error": error} for file, error in failures],
+        }
+        print(json.dumps(_json_safe(document), indent=2, ensure_ascii=False, allow_nan=False))
+    else:
+        _print_text(results, len(args.files))
+    for _, error in failures:
+        print(f"rthstrack: {error}", file=sys.stderr)
+    for note in notes:
+        print(note, file=sys.stderr)
+    if failures:
+        return FAILED
+    return EXCEEDED if any(a.exceeded for a in assessments) else 0
+
+
+def result_entry(a: Assessment) -> dict[str, Any]:
+    """One result as `--json` prints it, numbers at full precision."""
+    t, i = a.tracking, a.indices
+    return {
+        "file": a.file,
+        "actuator": a.actuator,
+        "target": a.target_name,
+        "measured": a.measured_name,
+        "unit": a.unit,
+        "rate_hz": a.rate_hz,
+        "n_samples": t.n_samples,
+        "amplitude": t.amplitude,
+        "delay_s": t.delay_s,
+        "phase_rad": t.phase_rad,
+        "equivalent_frequency_hz": t.equivalent_frequency_hz,
+        "n_bins": t.n_bins,
+        "delta_f_hz": t.delta_f_hz,
+        "settings": a.settings,
+        "indices": {
+            "max_tracking_error": i.max_tracking_error,
+            "max_tracking_error_percent": i.max_tracking_error_percent,
+            "rms_error": i.rms_error,
+            "rms_error_percent": i.rms_error_percent,
+            "tracking_indicator": i.tracking_indicator,
+            "j1_s": i.j1_s,
+            "j2_percent": i.j2_percent,
+            "j3_percent": i.j3_percent,
+        },
+        "warnings": [*a.warnings, *a.exceeded],
+    }
+
+
+def assess_file(file: str, args: argparse.Namespace) -> list[Assessment]:
+    """Reads one file and judges each of its pairs.
+
+    Raises RecordingError, ChannelError or SignalError, with the file and the channels named.
+    """
+    recording = read_recording(file, rate_hz=args.rate, time=args.time, resample_hz=args.resample)
+    if recording.rate_hz is None:
+        raise RecordingError(f"{file}: no sampling rate: {recording.rate_source}; give --rate HZ or --time CHANNEL")
+    if args.target:
+        pairs, proposal = list(zip(args.target, args.measured, strict=True)), None
+    else:
+        pairs, proposal = propose_pair(recording)
+    commands: Sequence[str | None] = args.command or [None] * len(pairs)
+    if len(commands) != len(pairs):
+        raise RecordingError(
+            f"{file}: {len(commands)} --command for {len(pairs)} proposed pairs: name each --target and --measured"
+        )
+    if args.fill:
+        recording = recording.filled(args.fill)
+    recording = recording.scaled(dict(args.scale))
+    if args.start is not None or args.end is not None:
+        recording = recording.cut(args.start, args.end)
+    found = []
+    for actuator, ((target, measured), command) in enumerate(zip(pairs, commands, strict=True)):
+        parts = [("whole", target, measured)]
+        if command is not None:
+            parts += [("compensator", target, command), ("actuator", command, measured)]
+        for part, asked, answered in parts:
+            found.append(_assess(recording, actuator, part, asked, answered, proposal, args))
+    return found
+
+
+def _assess(
+    recording: Recording,
+    actuator: int,
+    part: str,
+    target: str,
+    measured: str,
+    proposal: str | None,
+    args: argparse.Namespace,
+) -> Assessment:
+    asked, answered = recording.channel(target), recording.channel(measured)
+    assert recording.rate_hz is not None
+    origin = {
+        "rate_source": recording.rate_source,
+        "start_s": args.start,
+        "end_s": args.end,
+        "scale": dict(args.scale),
+        "fill": args.fill,
+        "n_filled": {c.name: recording.n_filled.get(c.path, 0) for c in (asked, answered)} if args.fill else {},
+        "resample_hz": args.resample,
+        "notes": list(recording.notes),
+        "channels": proposal or "named by the user",
+    }
+    try:
+        assessment = assess(
+            asked.values,
+            answered.values,
+            recording.rate_hz,
+            settings=_settings(args),
+            moving_s=args.moving,
+            hop_s=args.hop,
+            limits=Limits(args.limit_delay, args.limit_amplitude) if part == "whole" else None,
+            file=recording.file,
+            actuator=actuator,
+            part=part,
+            target_name=asked.name,
+            measured_name=answered.name,
+            unit=asked.unit,
+            measured_unit=answered.unit,
+            start_s=recording.start_s,
+            origin=origin,
+        )
+    except SignalError as error:
+        hint = " (--fill SAMPLES interpolates short gaps)" if "NaN" in str(error) and not args.fill else ""
+        channels = f"target '{asked.name}', measured '{answered.name}'"
+        raise SignalError(f"{recording.file}: {channels}: {error}{hint}") from None
+    except SettingError as error:
+        raise SettingError(f"{recording.file}: {error}") from None
+    said = list(assessment.warnings)
+    if proposal is not None and part == "whole":
+        said.insert(0, f"no channels were named: judged target '{asked.name}', measured '{answered.name}' ({proposal})")
+    said += [f"{recording.file}: {note}" for note in recording.notes] if part == "whole" else []
+    return dataclasses.replace(assessment, warnings=tuple(said))
+
+
+def _settings(args: argparse.Namespace) -> Settings:
+    return Settings(
+        estimator=args.estimator,
+        data_decimation=args.P,
+        frequency_decimation=args.Q,
+        decimator=args.decimator,
+        weight_power=args.weight_power,
+        window=args.window,
+        detrend=args.detrend,
+        band_hz=tuple(args.band) if args.band else None,
+    )
+
+
+def _check(args: argparse.Namespace, misuse: Callable[[str], Any]) -> None:
+    """What argparse cannot see: options that need or exclude each other."""
+    targets, measured, commands = (args.target or []), (args.measured or []), (args.command or [])
+    if len(targets) != len(measured):
+        misuse(f"--target and --measured go in pairs, found {len(targets)} and {len(measured)}")
+    if commands and targets and len(commands) != len(targets):
+        misuse(f"one --command for each --target is needed, found {len(commands)} for {len(targets)}")
+    if args.band and args.band[0] > args.band[1]:
+        misuse(f"--band LO HI: LO must not exceed HI, found {args.band[0]:g} {args.band[1]:g}")
+    if args.start is not None and args.end is not None and args.start >= args.end:
+        misuse(f"--start must come before --end, found {args.start:g} and {args.end:g}")
+    if args.resample and (args.rate):
+        misuse("--resample interpolates the file's time stamps and excludes --rate")
+    for option in ("report", "figure", "csv"):
+        path = getattr(args, option)
+        if path is not None and not path.parent.is_dir():
+            misuse(f"--{option}: there is no directory {path.parent}")
+
+
+def _evaluate_all(args: argparse.Namespace) -> tuple[list[list[Assessment]], list[tuple[str, str]]]:
+    """All files, on all cores; one that fails does not stop the rest."""
+
+    def one(file: str) -> list[Assessment] | str:
+        try:
+            return assess_file(file, args)
+        except RthstrackError as error:
+            message = str(error)
+            return message if message.startswith(file) else f"{file}: {message}"
+        except MemoryError:
+            return f"{file}: does not fit into memory"
+
+    files = args.files
+    if len(files) == 1:
+        found: Iterable[list[Assessment] | str] = [one(files[0])]
+    else:
+        with ThreadPoolExecutor(max_workers=min(len(files), os.cpu_count() or 1)) as pool:
+            found = list(_with_progress(pool.map(one, files), len(files)))
+    results, failures = [], []
+    for file, outcome in zip(files, found, strict=True):
+        if isinstance(outcome, str):
+            failures.append((file, outcome))
+        else:
+            results.append(outcome)
+    return results, failures
+
+
+def _with_progress(outcomes: Iterable[Any], total: int) -> Iterable[Any]:
+    """A progress bar on standard error, where that is a terminal."""
+    if not sys.stderr.isatty():
+        return outcomes
+    from rich.console import Console
+    from rich.progress import track
+
+    return track(outcomes, total=total, description="evaluating", console=Console(stderr=True), transient=True)
+
+
+def _write_outputs(args: argparse.Namespace, assessments: Sequence[Assessment]) -> list[str]:
+    """Report, figure and CSV; returns what was written, one line each."""
+    if not assessments:
+        return []
+    notes = []
+    try:
+        if args.report is not None:
+            from rthstrack.report import write_report
+
+            write_report(assessments, args.report)
+            notes.append(f"report written to {args.report}")
+        if args.figure is not None:
+            from rthstrack.plots import write_figure
+
+            for a, path in _figure_paths(args.figure, assessments):
+                write_figure(a, path)
+                notes.append(f"figure written to {path}")
+        if args.csv is not None:
+            _write_csv(args.csv, [_flat(result_entry(a)) for a in assessments])
+            notes.append(f"results written to {args.csv}")
+            if args.moving is not None:
+                path = args.csv.with_stem(f"{args.csv.stem}_moving")
+                _write_csv(path, [row for a in assessments for row in _readings(a)])
+                notes.append(f"readings written to {path}")
+    except OSError as error:
+        raise RecordingError(f"cannot write {error.filename}: {error.strerror}") from None
+    return notes
+
+
+def _figure_paths(path: Path, assessments: Sequence[Assessment]) -> list[tuple[Assessment, Path]]:
+    """One path an assessment: the given one where there is one, else with a number before the ending."""
+    if len(assessments) == 1:
+        return [(assessments[0], path)]
+    return [(a, path.with_stem(f"{path.stem}_{i}")) for i, a in enumerate(assessments, start=1)]
+
+
+def _flat(entry: dict[str, Any], before: str = "") -> dict[str, Any]:
+    row: dict[str, Any] = {}
+    for key, value in entry.items():
+        if isinstance(value, dict):
+            row |= _flat(value, f"{before}{key}.")
+        else:
+            row[before + key] = "; ".join(map(str, value)) if isinstance(value, list | tuple) else value
+    return row
+
+
+def _readings(a: Assessment) -> Iterable[dict[str, Any]]:
+    if a.moving is None:
+        return
+    columns = a.moving.to_dict()
+    names = ("amplitude", "delay_s", "phase_rad", "equivalent_frequency_hz", "valid")
+    for i, time_s in enumerate(columns["time_s"]):
+        about = {"file": a.file, "actuator": a.actuator, "target": a.target_name, "measured": a.measured_name}
+        yield about | {"time_s": a.start_s + time_s} | {name: columns[name][i] for name in names}
+
+
+def _write_csv(path: Path, rows: Sequence[dict[str, Any]]) -> None:
+    fields = list(dict.fromkeys(key for row in rows for key in row))
+    with open(path, "w", newline="", encoding="utf-8") as out:
+        writer = csv.DictWriter(out, fields, restval="")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def _print_text(results: Sequence[Sequence[Assessment]], n_files: int) -> None:
+    from rich.console import Console
+
+    console = Console(highlight=False, soft_wrap=True)
+    if n_files == 1:
+        for a in (a for found in results for a in found):
+            _print_one(console, a)
+    elif any(results):
+        _print_table_of_all(console, [a for found in results for a in found])
+
+
+_PARTS = {"whole": "", "compensator": "compensator: ", "actuator": "actuator: "}
+
+
+def _print_one(console: Console, a: Assessment) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    t, i = a.tracking, a.indices
+    which = f"actuator {a.actuator}: " if a.actuator else ""
+    console.print(Text(f"{which}{_PARTS[a.part]}{a.verdict}", style="bold"))
+    for text in a.exceeded:
+        console.print(Text(f"limit exceeded: {text}", style="bold red"))
+    unit = f" {a.unit}" if a.unit else ""
+    table = Table(box=None, show_header=False, pad_edge=False)
+    table.add_column(style="dim", no_wrap=True)
+    table.add_column(overflow="fold")
+    band = "" if a.tracking.settings.band_hz is None else f", band {t.settings.band_hz}"
+    for label, value in (
+        ("file", f"{a.file}, {t.n_samples} samples at {a.rate_hz:g} Hz ({a.settings.get('rate_source', 'given')})"),
+        ("target, measured", f"{a.target_name}, {a.measured_name}"),
+        ("amplitude", f"{t.amplitude:.6g}"),
+        ("delay", f"{1e3 * float(t.delay_s):.6g} ms"),
+        ("phase", f"{math.degrees(float(t.phase_rad)):.5g} degrees at {float(t.equivalent_frequency_hz):.5g} Hz"),
+        ("bins", f"{t.n_bins}, every {t.delta_f_hz:.4g} Hz{band}"),
+        ("moving windows", _moving_text(a)),
+        ("max tracking error", f"{i.max_tracking_error:.4g}{unit} ({i.max_tracking_error_percent:.3g} %)"),
+        ("rms error", f"{i.rms_error:.4g}{unit} ({i.rms_error_percent:.3g} %)"),
+        ("tracking indicator", f"{i.tracking_indicator:.4g}" + (f"{unit}^2" if unit else "")),
+        ("J1, J2, J3", f"{1e3 * i.j1_s:.4g} ms, {i.j2_percent:.3g} %, {i.j3_percent:.3g} %"),
+    ):
+        table.add_row(label, Text(value))
+    console.print(table)
+    for warning in a.warnings:
+        console.print(Text("warning: ", style="yellow") + Text(warning))
+    console.print()
+
+
+def _moving_text(a: Assessment) -> str:
+    import numpy as np
+
+    if a.moving is None:
+        return a.moving_note or ""
+    valid = a.moving.valid
+    if not valid.any():
+        return "no window has enough energy to judge by"
+    delays, amplitudes = 1e3 * a.moving.delay_s[valid], a.moving.amplitude[valid]
+    (low, high), (small, large) = np.quantile(delays, (0.1, 0.9)), np.quantile(amplitudes, (0.1, 0.9))
+    return (
+        f"of {a.moving.window_s:g} s: delay {low:.4g} to {high:.4g} ms, amplitude {small:.4g} to {large:.4g} "
+        f"(10 to 90 % of {valid.sum()} readings)"
+    )
+
+
+def _print_table_of_all(console: Console, assessments: Sequence[Assessment]) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False)
+    table.add_column("file", overflow="fold")
+    table.add_column("target, measured", overflow="fold")
+    for name in ("amplitude", "delay ms", "at Hz", "rms error %"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("")
+    for a in assessments:
+        t = a.tracking
+        remarks = "LIMIT" if a.exceeded else ""
+        if a.warnings:
+            remarks += f" {len(a.warnings)} warning" + ("s" if len(a.warnings) > 1 else "")
+        table.add_row(
+            Text(a.file),
+            Text(f"{a.target_name}, {a.measured_name}"),
+            f"{float(t.amplitude):.4f}",
+            f"{1e3 * float(t.delay_s):.3f}",
+            f"{float(t.equivalent_frequency_hz):.3g}",
+            f"{a.indices.rms_error_percent:.3g}",
+            Text(remarks.strip(), style="bold red" if a.exceeded else "yellow"),
+        )
+    console.print(table)
+
+
+def _json_safe(value: Any) -> Any:
+    """JSON has no NaN: what is not determined is null."""
+    if isinstance(value, dict):
+        return {str(k): _json_safe(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_json_safe(v) for v in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def _number(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected a number, found '{text}'") from None
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"expected a finite number, found '{text}'")
+    return value
+
+
+def _positive(text: str) -> float:
+    if (value := _number(text)) <= 0:
+        raise argparse.ArgumentTypeError(f"expected a positive number, found '{text}'")
+    return value
+
+
+def _not_negative(text: str) -> float:
+    if (value := _number(text)) < 0:
+        raise argparse.ArgumentTypeError(f"expected zero or a positive number, found '{text}'")
+    return value
+
+
+def _count(text: str) -> int:
+    if not text.isascii() or not text.isdigit() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 1 on, found '{text}'")
+    return int(text)
+
+
+def _power_of_two(text: str) -> int:
+    if (value := _count(text)) & (value - 1):
+        raise argparse.ArgumentTypeError(f"expected a power of two (1, 2, 4, ...), found '{text}'")
+    return value
+
+
+def _weight_power(text: str) -> int:
+    if (value := _count(text)) > 16:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 1 to 16, found '{text}'")
+    return value
+
+
+def _scale(text: str) -> tuple[str, float]:
+    channel, equals, factor = text.rpartition("=")
+    if not equals or not channel:
+        raise argparse.ArgumentTypeError(f"expected CHANNEL=X, found '{text}'")
+    if (value := _number(factor)) == 0:
+        raise argparse.ArgumentTypeError(f"expected a factor other than zero, found '{text}'")
+    return channel, value
+
+
+def _path(*endings: str) -> Callable[[str], Path]:
+    def check(text: str) -> Path:
+        path = Path(text)
+        if path.suffix.lower() not in endings:
+            raise argparse.ArgumentTypeError(f"expected a name that ends in {' or '.join(endings)}, found '{text}'")
+        return path
+
+    return check

@@ -1,0 +1,50 @@
+"""What a reader hands back: everything a file holds, before a sampling rate is settled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Series:
+    """One column of numbers (n_samples,). `unit` is what the file states apart from the name."""
+
+    name: str
+    path: str
+    unit: str | None
+    values: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Clock:
+    """A column of dates or times of day: seconds since its first entry (n_samples,), NaN where a cell is empty."""
+
+    name: str
+    path: str
+    seconds: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class RateStatement:
+    """A sampling rate that the file states, and where. `channel` is the path it holds for, None for the whole file."""
+
+    source: str
+    rate_hz: float
+    channel: str | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contents:
+    """A file's contents. `nameless` says that columns have no names, so that time cannot be recognised by one."""
+
+    format: str
+    series: tuple[Series, ...]
+    clocks: tuple[Clock, ...] = ()
+    statements: tuple[RateStatement, ...] = ()
+    notes: tuple[str, ...] = ()
+    nameless: bool = False

@@ -1,0 +1,65 @@
+"""LabVIEW TDMS."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from nptdms import TdmsFile
+
+from rthstrack.errors import RecordingError
+from rthstrack.readers.arrays import as_float, clock, is_numeric, rate_of, tidy, unit_in
+from rthstrack.readers.contents import Clock, Contents, RateStatement, Series
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def read(path: Path) -> Contents:
+    """Reads the channels of all groups, named `group/channel`; `wf_increment` states the rate."""
+    size = path.stat().st_size
+    series: list[Series] = []
+    clocks: list[Clock] = []
+    statements: list[RateStatement] = []
+    notes: list[str] = []
+    with TdmsFile.open(path) as file:
+        if file.file_status.incomplete_final_segment:
+            raise RecordingError("truncated: its last segment is incomplete")
+        for source, properties in [("", file.properties), *((g.name, g.properties) for g in file.groups())]:
+            statements += _rates(source, properties)
+        for group in file.groups():
+            for channel in group.channels():
+                name = f"{group.name}/{channel.name}"
+                width = getattr(channel.data_type, "size", None) or 1
+                # The data are stored as they are, so that a file cannot hold more than its own length.
+                if len(channel) * width > size:
+                    raise RecordingError(f"damaged: '{name}' claims {len(channel)} values in a file of {size} bytes")
+                values = np.asarray(channel[:])
+                if values.dtype.kind == "M":
+                    clocks.append(clock(name, values))
+                elif values.size == 0 or not is_numeric(values.dtype):
+                    notes.append(f"'{name}' {'holds no numbers' if values.size else 'is empty'}, no channel")
+                else:
+                    unit = unit_in(channel.properties)
+                    series.append(Series(channel.name, name, unit, as_float(values)))
+                    statements += _increment(name, channel.properties)
+    return Contents("TDMS", tuple(series), tuple(clocks), tuple(statements), tuple(notes))
+
+
+def _increment(name: str, properties: Any) -> list[RateStatement]:
+    """A waveform's own rate."""
+    step = properties.get("wf_increment")
+    if isinstance(step, (int, float)) and math.isfinite(step) and step > 0:
+        return [RateStatement("TDMS wf_increment", tidy(1 / step), name)]
+    return []
+
+
+def _rates(source: str, properties: Any) -> list[RateStatement]:
+    """What a file's or a group's properties state."""
+    found = []
+    for key, value in properties.items():
+        rate = rate_of(key, value) if isinstance(value, (int, float)) else None
+        if rate is not None:
+            found.append(RateStatement(f"property '{key}'" + (f" of '{source}'" if source else ""), rate))
+    return found
