@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -14,19 +16,18 @@ from rthstrack.tracking import Settings, Tracking
     [
         (0.716969, "0.7170"),
         (13.5075, "13.51"),
-        (-44.9812, "−44.98"),
+        (-44.9812, "\N{MINUS SIGN}44.98"),
         (2611.4, "2611"),
         (123456.7, "123457"),
-        (1234567.0, "1.235×10⁶"),
+        (1234567.0, "1.235\N{MULTIPLICATION SIGN}10⁶"),
         (0.00012344, "0.0001234"),
-        (-0.000012344, "−1.234×10⁻⁵"),
+        (-0.000012344, "\N{MINUS SIGN}1.234\N{MULTIPLICATION SIGN}10⁻⁵"),
         (0.0, "0"),
         (65536, "65536"),
-        (9.9996, "10.00"),
+        (9.9996, "10.00"),  # rounding takes it up a decade, and a decimal away
     ],
 )
 def test_numbers_are_written_with_four_significant_digits(value: float, text: str) -> None:
-    # 9.9996 rounds up a decade: scientific notation of 1.000e1 leaves two decimals
     assert display.significant(value) == text
 
 
@@ -39,7 +40,7 @@ def test_the_points_drawn_hold_every_group_minimum_and_maximum_of_every_column()
     assert kept[-1] == 10_006
     assert kept.size <= 2 * 3 * 100 + 2
     for column in columns:
-        for first, end in zip(edges[:-1], edges[1:], strict=True):
+        for first, end in itertools.pairwise(edges):
             shown = column[kept[(kept >= first) & (kept < end)]]
             assert shown.min() == column[first:end].min()
             assert shown.max() == column[first:end].max()

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from rthstrack.errors import RecordingError
 from rthstrack.recording import Recording, read_recording
 
@@ -257,7 +258,7 @@ def test_the_other_text_records_are_read_whole(shared: Path) -> None:
         (b"\xef\xbb\xbf\n", "the file is empty; expected lines of numbers"),
         (b"t,x,y\n", "no rows of numbers in 1 line(s) of text"),
         (b"Just a letter.\nWithout any table, from 5 of us.\n", "no rows of numbers in 2 line(s)"),
-        (b"t,x\n0.0,1.0\n0.1,\x00\n", "byte 0x00 at offset 15; expected lines of numbers, found binary content"),
+        (b"t,x\n0.0,1.0\n0.1,\x00\n", "byte 0x00 at offset 16; expected lines of numbers, found binary content"),
         (b"\x01\x02\x03garbage,1.0\n", "byte 0x01 at offset 0"),
         (bytes(range(256)) * 4, "not a text file"),
         (b"\xff\xfe" + "t,x\n0,1\n".encode("utf-16-le") + b"\x31", "half a character at byte offset 18"),
@@ -289,7 +290,8 @@ def test_what_is_wrong_with_a_text_is_said_in_one_line(tmp_path: Path, content: 
         read(tmp_path, content)
     message = str(caught.value)
     assert said in message
-    assert message.startswith(str(tmp_path / "file.csv")) and "\n" not in message
+    assert message.startswith(str(tmp_path / "file.csv"))
+    assert "\n" not in message
 
 
 def test_the_line_number_counts_every_line_of_the_file(tmp_path: Path) -> None:

@@ -177,6 +177,31 @@ impl Pass {
         }
     }
 
+    /// [`Pass::run`] on the samples `x` zero-padded to `n`, for a window of a longer record whose own outputs are known:
+    /// `stream[i]` is the output centred on x[factor i]. Only those near the window's ends are computed anew, in the same
+    /// order of additions, so that the bits are those of [`Pass::run`]. `padded` need not be prepared.
+    #[inline(always)]
+    fn run_window<S: Simd>(&self, simd: S, padded: &mut [f64], n: usize, x: &[f64], stream: &[f64], out: &mut [f64]) {
+        let n_out = n / self.factor;
+        let inner = self.reach.div_ceil(self.factor)..(x.len() - 1 - self.reach) / self.factor + 1;
+        let at = |p: usize| if p < x.len() { x[p] } else { 0.0 };
+        let margin = self.groups.len() * self.factor + MAX_BLOCK;
+        for i in 0..self.reach {
+            padded[i] = at(n - self.reach + i);
+        }
+        let head = (inner.start * self.factor + margin).min(x.len());
+        padded[self.reach..self.reach + head].copy_from_slice(&x[..head]);
+        self.outputs(simd, padded, out, 0, inner.start);
+        out[inner.clone()].copy_from_slice(&stream[inner.clone()]);
+        let tail = inner.end * self.factor - self.reach;
+        padded[self.reach + tail..self.reach + x.len()].copy_from_slice(&x[tail..]);
+        padded[self.reach + x.len()..].fill(0.0);
+        for i in 0..self.reach {
+            padded[self.reach + n + i] = x[i];
+        }
+        self.outputs(simd, padded, out, inner.end, n_out);
+    }
+
     /// The outputs `[from, to)`.
     #[inline(always)]
     fn outputs<S: Simd>(&self, simd: S, padded: &[f64], out: &mut [f64], from: usize, to: usize) {
@@ -290,26 +315,84 @@ impl Cascade {
     /// Shortens `input` (laid out as [`Cascade::input_layout`] says; `filled` samples of it may be non-zero) into `out`.
     #[inline(always)]
     pub(crate) fn run<S: Simd>(&self, simd: S, input: &mut [f64], filled: usize, scratch: &mut [f64], out: &mut [f64]) {
-        let (mut n, mut filled) = (self.n, filled);
-        let mut input = input;
-        let mut rest = scratch;
-        for (i, pass) in self.passes.iter().enumerate() {
+        self.run_from(
+            simd,
+            #[inline(always)]
+            |pass, y| pass.run(simd, input, self.n, filled, y),
+            scratch,
+            out,
+        );
+    }
+
+    /// The same for a window of a longer record, whose first pass is known inside: see [`Cascade::stream`].
+    #[inline(always)]
+    pub(crate) fn run_window<S: Simd>(
+        &self,
+        simd: S,
+        x: &[f64],
+        stream: &[f64],
+        input: &mut [f64],
+        scratch: &mut [f64],
+        out: &mut [f64],
+    ) {
+        self.run_from(
+            simd,
+            #[inline(always)]
+            |pass, y| pass.run_window(simd, input, self.n, x, stream, y),
+            scratch,
+            out,
+        );
+    }
+
+    /// All passes, the first by `first`.
+    #[inline(always)]
+    fn run_from<S: Simd>(&self, simd: S, first: impl FnOnce(&Pass, &mut [f64]), scratch: &mut [f64], out: &mut [f64]) {
+        let Some((pass, rest)) = self.passes.split_first() else { return };
+        let mut n = self.n / pass.factor;
+        let Some(next) = rest.first() else { return first(pass, &mut out[..n]) };
+        let (mut input, mut scratch) = scratch.split_at_mut(next.padded_len(n));
+        first(pass, &mut input[next.reach..next.reach + n]);
+        for (i, pass) in rest.iter().enumerate() {
             let n_out = n / pass.factor;
-            match self.passes.get(i + 1) {
-                None => pass.run(simd, input, n, filled, &mut out[..n_out]),
+            match rest.get(i + 1) {
+                None => pass.run(simd, input, n, n, &mut out[..n_out]),
                 Some(next) => {
-                    let (padded, after) = std::mem::take(&mut rest).split_at_mut(next.padded_len(n_out));
-                    pass.run(simd, input, n, filled, &mut padded[next.reach..next.reach + n_out]);
-                    (input, rest) = (padded, after);
+                    let (padded, after) = scratch.split_at_mut(next.padded_len(n_out));
+                    pass.run(simd, input, n, n, &mut padded[next.reach..next.reach + n_out]);
+                    (input, scratch) = (padded, after);
                 }
             }
-            (n, filled) = (n_out, n_out);
+            n = n_out;
         }
     }
 
-    /// The first pass's (factor, reach); `None` where there is none.
-    pub(crate) fn first_pass(&self) -> Option<(usize, usize)> {
-        self.passes.first().map(|p| (p.factor, p.reach))
+    /// The first pass over a whole record, for windows of `window` samples that start at multiples of `hop`: output i is
+    /// centred on sample factor * i. `None` where windows cannot share it.
+    pub(crate) fn stream<S: Simd>(&self, simd: S, samples: &[f64], window: usize, hop: usize) -> Option<Stream> {
+        let pass = self.passes.first()?;
+        if hop % pass.factor != 0 || window <= 2 * pass.reach + pass.factor || window > self.n {
+            return None;
+        }
+        let n_out = samples.len().div_ceil(pass.factor);
+        let mut padded = vec![0.0; pass.padded_len(n_out * pass.factor)];
+        padded[pass.reach..pass.reach + samples.len()].copy_from_slice(samples);
+        let mut outputs = vec![0.0; n_out];
+        pass.outputs(simd, &padded, &mut outputs, 0, n_out);
+        Some(Stream { factor: pass.factor, outputs })
+    }
+}
+
+/// A record through the first pass.
+#[derive(Debug, Clone)]
+pub(crate) struct Stream {
+    factor: usize,
+    outputs: Vec<f64>,
+}
+
+impl Stream {
+    /// The outputs from sample `start` on, a multiple of the hop.
+    pub(crate) fn from(&self, start: usize) -> &[f64] {
+        &self.outputs[start / self.factor..]
     }
 }
 

@@ -15,7 +15,7 @@ use num_complex::Complex;
 use pulp::{Arch, NullaryFnOnce, Simd, WithSimd};
 use rustfft::{Fft, FftPlanner};
 
-use crate::decimate::Cascade;
+use crate::decimate::{Cascade, Stream};
 use crate::error::{Error, Result};
 use crate::window::{Detrend, Window};
 
@@ -162,12 +162,27 @@ impl Spectrum {
 
     /// Transforms both signals into the state's packed buffers.
     pub(crate) fn transform(&self, state: &mut SpectrumState, target: &[f64], measured: &[f64]) {
-        let SpectrumState { target: target_bins, measured: measured_bins, scratch, passes } = state;
-        for (samples, bins) in [(target, target_bins), (measured, measured_bins)] {
-            let shorten = Shorten { plan: self, samples, out: bytemuck::cast_slice_mut(bins), scratch, passes };
-            self.arch.dispatch(shorten);
+        self.transform_with(state, [(target, None), (measured, None)]);
+    }
+
+    /// The same for windows of longer records whose [`Spectrum::stream`] is given from the window's start on.
+    pub(crate) fn transform_with(&self, state: &mut SpectrumState, signals: [(&[f64], Option<&[f64]>); 2]) {
+        let SpectrumState { target, measured, scratch, passes } = state;
+        for ((samples, stream), bins) in signals.into_iter().zip([target, measured]) {
+            let out = bytemuck::cast_slice_mut(bins);
+            self.arch.dispatch(Shorten { plan: self, samples, stream, out, scratch, passes });
             self.fft.process_with_scratch(bins, scratch);
         }
+    }
+
+    /// What windows that start at multiples of `hop` share: the cascade's first pass, where nothing is done to the samples
+    /// before it.
+    pub(crate) fn stream(&self, samples: &[f64], hop: usize) -> Option<Stream> {
+        let plain = self.window.is_none() && self.config.detrend == Detrend::None && self.folded_len == self.fft_len;
+        if !plain {
+            return None;
+        }
+        self.arch.dispatch(MakeStream { plan: self, samples, hop })
     }
 
     /// Detrends, windows, zero-pads, folds and decimates one signal into `out`.
@@ -176,6 +191,7 @@ impl Spectrum {
         &self,
         simd: S,
         samples: &[f64],
+        stream: Option<&[f64]>,
         out: &mut [f64],
         scratch: &mut [Complex<f64>],
         passes: &mut [f64],
@@ -189,6 +205,10 @@ impl Spectrum {
         // On a cache line's start no load of the cascade straddles two.
         let skip = input.as_ptr().align_offset(ALIGNMENT).min(ALIGNMENT / size_of::<f64>());
         let input = &mut input[skip..skip + len];
+        if let Some(stream) = stream {
+            self.cascade.run_window(simd, samples, stream, input, passes, out);
+            return;
+        }
         self.fold(samples, &mut input[start..start + self.folded_len]);
         self.cascade.run(simd, input, samples.len().min(self.folded_len), passes, out);
     }
@@ -248,6 +268,7 @@ impl Spectrum {
 struct Shorten<'a> {
     plan: &'a Spectrum,
     samples: &'a [f64],
+    stream: Option<&'a [f64]>,
     out: &'a mut [f64],
     scratch: &'a mut [Complex<f64>],
     passes: &'a mut [f64],
@@ -258,7 +279,23 @@ impl WithSimd for Shorten<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        self.plan.shorten(simd, self.samples, self.out, self.scratch, self.passes);
+        self.plan.shorten(simd, self.samples, self.stream, self.out, self.scratch, self.passes);
+    }
+}
+
+/// [`Cascade::stream`] compiled for the processor at hand.
+struct MakeStream<'a> {
+    plan: &'a Spectrum,
+    samples: &'a [f64],
+    hop: usize,
+}
+
+impl WithSimd for MakeStream<'_> {
+    type Output = Option<Stream>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Option<Stream> {
+        self.plan.cascade.stream(simd, self.samples, self.plan.config.n_samples, self.hop)
     }
 }
 

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use num_complex::Complex;
 
-use crate::decimate::{Chebyshev, Decimator};
+use crate::decimate::{Chebyshev, Decimator, Stream};
 use crate::error::{Error, Result};
 use crate::pair::{Pair, check_rate};
 use crate::spectrum::{Bins, LANES, Sink, Spectrum, SpectrumConfig, SpectrumState};
@@ -420,20 +420,32 @@ pub(crate) struct Moving<'a> {
     evaluator: &'a Evaluator,
     state: EvaluatorState,
     pair: &'a Pair<'a>,
+    streams: Option<[Stream; 2]>,
 }
 
 impl Evaluator {
     /// Prepares to evaluate windows of `pair` that start at multiples of `hop`.
-    pub(crate) fn moving<'a>(&'a self, pair: &'a Pair<'a>, _hop: usize) -> Moving<'a> {
-        Moving { evaluator: self, state: self.state(), pair }
+    pub(crate) fn moving<'a>(&'a self, pair: &'a Pair<'a>, hop: usize) -> Moving<'a> {
+        let streams = match self.chebyshev {
+            Some(_) => None,
+            None => {
+                let stream = |samples| self.spectrum.stream(samples, hop);
+                stream(pair.target()).zip(stream(pair.measured())).map(|(target, measured)| [target, measured])
+            }
+        };
+        Moving { evaluator: self, state: self.state(), pair, streams }
     }
 }
 
 impl Moving<'_> {
-    /// The reading of the window that starts at sample `start`.
+    /// The reading of the window that starts at sample `start`: that of [`Evaluator::evaluate`], bit for bit.
     pub(crate) fn at(&mut self, start: usize) -> Result<Tracking> {
-        let range = start..start + self.evaluator.n_samples;
-        let window = Pair::new(&self.pair.target()[range.clone()], &self.pair.measured()[range], self.pair.rate_hz())?;
-        self.evaluator.evaluate(&mut self.state, &window)
+        let Self { evaluator, state, pair, streams } = self;
+        let range = start..start + evaluator.n_samples;
+        let window = Pair::new(&pair.target()[range.clone()], &pair.measured()[range], pair.rate_hz())?;
+        let Some([target, measured]) = streams else { return evaluator.evaluate(state, &window) };
+        let signals = [(window.target(), Some(target.from(start))), (window.measured(), Some(measured.from(start)))];
+        evaluator.spectrum.transform_with(&mut state.spectrum, signals);
+        evaluator.finish(evaluator.sum(&state.spectrum), &window)
     }
 }

@@ -48,7 +48,7 @@ impl Dialect {
                 let found = self.kind(field);
                 let wanted = self.kinds[n_fields];
                 n_numbers += usize::from(found == Kind::Number && wanted == Kind::Number);
-                fit = found == wanted || found == Kind::Nothing || matches!(wanted, Kind::Text | Kind::Nothing);
+                fit = found == wanted || found == Kind::Nothing || wanted == Kind::Text;
             }
             n_fields += 1;
         });
@@ -140,13 +140,13 @@ fn judge(lines: &[&[u8]], delimiter: Delimiter, point: u8) -> Option<(f64, Diale
         rows.push((n_fields, weight, share));
         *by_count.entry(n_fields).or_default() += weight;
     }
-    let (n_columns, score) = by_count.into_iter().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))?;
+    let (n_columns, _) = by_count.into_iter().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))?;
     let mut counts = vec![[0.0f64; 3]; n_columns];
     let (mut n_rows, mut share_sum) = (0usize, 0.0);
     let n_below = lines.len() - rows.iter().position(|row| row.0 == n_columns).unwrap_or(0);
     let mut decided = None;
     let mut customary = None;
-    for (line, (n_fields, weight, share)) in lines.iter().zip(rows) {
+    for (line, &(n_fields, weight, share)) in lines.iter().zip(&rows) {
         if n_fields != n_columns {
             continue;
         }
@@ -190,7 +190,11 @@ fn judge(lines: &[&[u8]], delimiter: Delimiter, point: u8) -> Option<(f64, Diale
         return None;
     }
     let order = decided.or(customary).unwrap_or(Order::MonthFirst);
-    Some((score, Dialect { delimiter, point, kinds, order }))
+    let dialect = Dialect { delimiter, point, kinds, order };
+    // Lines of the preamble may have as many fields, but not of these kinds.
+    let ours = lines.iter().zip(rows).filter(|(line, row)| row.0 == n_columns && dialect.fits(line));
+    let score = ours.map(|(_, row)| row.1).sum();
+    Some((score, dialect))
 }
 
 /// How many bytes of a field are not blank.

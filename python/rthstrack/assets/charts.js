@@ -493,8 +493,7 @@ const Charts = (() => {
       frame(xs, ys);
       u.batch(() => {
         u.setData([null, [xs, ys]], false);
-        show(u, home);
-        u.redraw(true, false);
+        show(u, home); // draws anew even where the range stays
       });
     };
     return chart;

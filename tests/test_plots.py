@@ -1,0 +1,213 @@
+"""The figures: whose axes they draw on, what the labels say, what is written to disk. No window, no global state."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+
+import assessments as examples
+from rthstrack import plots
+from rthstrack.assessment import Assessment, Limits
+from rthstrack.errors import SettingError
+
+ONE = (plots.plot_time_history, plots.plot_error, plots.plot_loop, plots.plot_spectra)
+SEVERAL = ((plots.plot_frequency_response, 3), (plots.plot_moving, 2), (plots.plot_indices, 2))
+
+
+@pytest.fixture(scope="module")
+def judged() -> Assessment:
+    return examples.judged(
+        *examples.synthetic(), 200.0, start_s=2.5, limits=Limits(delay_s=0.05, amplitude=0.1), hop_s=0.5
+    )
+
+
+def labels(axes: list[Axes]) -> list[str]:
+    return [text for axis in axes for text in (axis.get_xlabel(), axis.get_ylabel())]
+
+
+@pytest.mark.parametrize("plot", ONE)
+def test_a_plot_draws_on_the_axes_it_is_given_and_returns_them(plot: Callable[..., Axes], judged: Assessment) -> None:
+    page = Figure()
+    ax = page.add_subplot()
+    assert plot(judged, ax=ax) is ax
+    assert ax.lines
+    own = plot(judged)
+    assert own.figure is not page
+    assert own.figure.get_figwidth() == plots.SINGLE_COLUMN_IN
+
+
+@pytest.mark.parametrize(("plot", "n"), SEVERAL)
+def test_a_plot_of_several_draws_on_the_axes_it_is_given_and_returns_them(
+    plot: Callable[..., Any], n: int, judged: Assessment
+) -> None:
+    axes = Figure().subplots(n, 1)
+    assert plot(judged, ax=axes) is axes
+    assert all(ax.lines for ax in axes)
+    as_list = list(Figure().subplots(n, 1))
+    assert plot(judged, ax=as_list) is as_list
+    assert len(plot(judged)) == n
+    with pytest.raises(SettingError, match=f"needs {n} axes"):
+        plot(judged, ax=list(Figure().subplots(n + 1, 1)))
+    with pytest.raises(SettingError, match=f"needs {n} axes"):
+        plot(judged, ax=Figure().add_subplot())
+
+
+def test_every_axis_says_its_unit(judged: Assessment) -> None:
+    assert labels([plots.plot_time_history(judged)]) == ["Time (s)", "Displacement (mm)"]
+    assert labels([plots.plot_error(judged)]) == ["Time (s)", "Error (mm)"]
+    assert labels([plots.plot_loop(judged)]) == ["Target (mm)", "Measured (mm)"]
+    assert labels([plots.plot_spectra(judged)]) == ["Frequency (Hz)", "Fourier amplitude (mm s)"]
+    response = list(plots.plot_frequency_response(judged))
+    assert [ax.get_ylabel() for ax in response] == ["Gain (–)", "Delay (ms)", "Coherence (–)"]
+    assert response[-1].get_xlabel() == "Frequency (Hz)"
+    moving = list(plots.plot_moving(judged))
+    assert [ax.get_ylabel() for ax in moving] == ["A (–)", "d (ms)"]
+    assert moving[-1].get_xlabel() == "Time (s)"
+    assert [ax.get_ylabel() for ax in plots.plot_indices(judged)] == ["Error so far (mm)", "TI (mm²)"]
+
+
+def test_the_parts_of_a_test_are_called_by_their_names() -> None:
+    _, compensator, actuator = examples.parts_of_a_test()
+    legend = plots.plot_time_history(compensator).get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == ["target", "command"]
+    assert labels([plots.plot_loop(actuator)]) == ["Command (mm)", "Measured (mm)"]
+
+
+def test_curves_are_the_assessments_numbers_at_its_own_time(judged: Assessment) -> None:
+    time_s = 2.5 + np.arange(judged.target.size) / 200.0
+    target, measured = plots.plot_time_history(judged).lines
+    np.testing.assert_allclose(target.get_xdata(), time_s, rtol=1e-14)
+    np.testing.assert_array_equal(target.get_ydata(), judged.target)
+    np.testing.assert_array_equal(measured.get_ydata(), judged.measured)
+    error = plots.plot_error(judged).lines[-1]
+    np.testing.assert_array_equal(error.get_ydata(), judged.measured - judged.target)
+    moving = judged.moving
+    assert moving is not None
+    amplitude_axis, delay_axis = plots.plot_moving(judged)
+    delay = next(line for line in delay_axis.lines if len(np.asarray(line.get_ydata())) == moving.time_s.size)
+    np.testing.assert_allclose(np.asarray(delay.get_ydata())[moving.valid], 1e3 * moving.delay_s[moving.valid])
+    assert np.isnan(np.asarray(delay.get_ydata())[~moving.valid]).all()
+    np.testing.assert_allclose(delay.get_xdata(), 2.5 + moving.time_s)
+    # limits at 1 +- 0.1 and +-50 ms, dashed
+    assert {0.9, 1.1} <= {float(np.asarray(line.get_ydata())[0]) for line in amplitude_axis.lines}
+    assert {-50.0, 50.0} <= {float(np.asarray(line.get_ydata())[0]) for line in delay_axis.lines}
+
+
+def test_a_part_of_the_record_can_be_shown(judged: Assessment) -> None:
+    line = plots.plot_time_history(judged, span_s=(12.5, 14.5)).lines[0]
+    np.testing.assert_allclose(np.asarray(line.get_xdata())[[0, -1]], [12.5, 14.5])
+    np.testing.assert_array_equal(line.get_ydata(), judged.target[2000:2401])
+    loop = plots.plot_loop(judged, span_s=(12.5, 14.5)).lines[-1]
+    np.testing.assert_array_equal(loop.get_xdata(), judged.target[2000:2401])
+    with pytest.raises(SettingError, match=r"2\.5 to 62\.495 s"):
+        plots.plot_error(judged, span_s=(100.0, 101.0))
+
+
+def test_low_coherence_is_grey(judged: Assessment) -> None:
+    response = judged.response
+    assert response is not None
+    gain_axis = plots.plot_frequency_response(judged)[0]
+    sure = response.coherence[response.frequency_hz > 0] >= 0.8
+    coloured = [
+        line for line in gain_axis.lines if to_hex(line.get_color()) == plots.VALUE and line.get_linewidth() == 1
+    ]
+    (curve,) = coloured
+    assert (~np.isnan(np.asarray(curve.get_ydata()))).tolist() == sure.tolist()
+
+
+def test_results_can_be_drawn_without_an_assessment(judged: Assessment) -> None:
+    assert judged.response is not None
+    assert judged.moving is not None
+    assert len(plots.plot_frequency_response(judged.response)) == 3
+    assert len(plots.plot_moving(judged.moving)) == 2
+
+
+def test_what_is_missing_is_said_in_the_axes() -> None:
+    bare = examples.judged(*examples.synthetic(1000), 200.0, moving_evaluation=False, response=False, unit=None)
+    for ax in plots.plot_moving(bare):
+        assert bare.moving_note in ax.texts[0].get_text()
+    for ax in plots.plot_frequency_response(bare):
+        assert bare.response_note in ax.texts[0].get_text()
+    assert plots.plot_error(bare).get_ylabel() == "Error (unit not stated)"
+
+
+@pytest.mark.parametrize(
+    ("name", "start"), [("a.png", b"\x89PNG\r\n\x1a\n"), ("a.pdf", b"%PDF-"), ("a.svg", b"<?xml"), ("A.PDF", b"%PDF-")]
+)
+def test_the_ending_decides_the_format(name: str, start: bytes, tmp_path: Path, judged: Assessment) -> None:
+    path = tmp_path / name
+    plots.write_figure(judged, path)
+    assert path.read_bytes().startswith(start)
+
+
+def test_a_pdf_embeds_truetype_fonts_and_fits_two_columns(tmp_path: Path, judged: Assessment) -> None:
+    path = tmp_path / "figure.pdf"
+    plots.write_figure(judged, path)
+    content = path.read_bytes()
+    assert b"/Type3" not in content
+    assert b"/Subtype /Type3" not in content
+    assert b"/FontFile2" in content
+    assert b"/MediaBox [ 0 0 518.4 " in content  # 7.2 in of 72 points
+
+
+@pytest.mark.parametrize(("name", "said"), [("a.jpg", "ends in .jpg"), ("figure", "has no ending")])
+def test_another_ending_is_one_clear_line(name: str, said: str, tmp_path: Path, judged: Assessment) -> None:
+    with pytest.raises(SettingError, match=said) as caught:
+        plots.write_figure(judged, tmp_path / name)
+    assert "\n" not in str(caught.value)
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(SettingError, match="cannot write the figure"):
+        plots.write_figure(judged, tmp_path / "missing" / "a.png")
+
+
+def test_the_composed_figure_has_every_panel(judged: Assessment) -> None:
+    page = plots.figure(judged)
+    assert page.get_figwidth() == plots.DOUBLE_COLUMN_IN
+    letters = [ax.get_title(loc="left") for ax in page.axes if ax.get_title(loc="left")]
+    assert letters == ["(a)", "(b)", "(c)", "(d)", "(e)", "(f)"]
+    history, zoomed = page.axes[0], page.axes[1]
+    low, high = zoomed.get_xlim()
+    assert high - low == pytest.approx(4.0, abs=0.02)
+    assert history.get_xlim() == pytest.approx((2.5, 2.5 + 11_999 / 200))
+
+
+def test_a_unit_with_a_dollar_sign_is_a_unit_and_not_a_formula(tmp_path: Path) -> None:
+    odd = examples.judged(*examples.synthetic(2000), 200.0, unit="$x_{$")
+    plots.write_figure(odd, tmp_path / "odd.svg")
+
+
+def test_matplotlibs_own_settings_are_left_as_they_were_by_threads_too(tmp_path: Path, judged: Assessment) -> None:
+    before = dict(matplotlib.rcParams)
+    failures: list[BaseException] = []
+
+    def draw(number: int) -> None:
+        try:
+            plots.write_figure(judged, tmp_path / f"{number}.svg")
+        except BaseException as error:
+            failures.append(error)
+
+    threads = [threading.Thread(target=draw, args=(number,)) for number in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert failures == []
+    assert len(list(tmp_path.iterdir())) == 4
+    assert dict(matplotlib.rcParams) == before
+
+
+def test_neither_pyplot_nor_a_display_is_needed() -> None:
+    code = "import sys, rthstrack.plots; sys.exit('matplotlib.pyplot' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
