@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import subprocess
 import sys
 import threading
@@ -69,10 +70,10 @@ def test_every_axis_says_its_unit(judged: Assessment) -> None:
     assert labels([plots.plot_loop(judged)]) == ["Target (mm)", "Measured (mm)"]
     assert labels([plots.plot_spectra(judged)]) == ["Frequency (Hz)", "Fourier amplitude (mm s)"]
     response = list(plots.plot_frequency_response(judged))
-    assert [ax.get_ylabel() for ax in response] == ["Gain (–)", "Delay (ms)", "Coherence (–)"]
+    assert [ax.get_ylabel() for ax in response] == ["Gain (-)", "Delay (ms)", "Coherence (-)"]
     assert response[-1].get_xlabel() == "Frequency (Hz)"
     moving = list(plots.plot_moving(judged))
-    assert [ax.get_ylabel() for ax in moving] == ["A (–)", "d (ms)"]
+    assert [ax.get_ylabel() for ax in moving] == ["A (-)", "d (ms)"]
     assert moving[-1].get_xlabel() == "Time (s)"
     assert [ax.get_ylabel() for ax in plots.plot_indices(judged)] == ["Error so far (mm)", "TI (mm²)"]
 
@@ -125,6 +126,14 @@ def test_low_coherence_is_grey(judged: Assessment) -> None:
     ]
     (curve,) = coloured
     assert (~np.isnan(np.asarray(curve.get_ydata()))).tolist() == sure.tolist()
+
+
+def test_what_is_grey_does_not_stretch_the_axis(judged: Assessment) -> None:
+    response = judged.response
+    assert response is not None
+    wild = dataclasses.replace(response, delay_s=np.where(response.coherence < 0.8, 100.0, response.delay_s))
+    delay_axis = plots.plot_frequency_response(wild)[1]
+    assert delay_axis.get_ylim()[1] < 1000  # ms
 
 
 def test_results_can_be_drawn_without_an_assessment(judged: Assessment) -> None:

@@ -223,6 +223,16 @@ def test_charts_show_the_samples_at_the_recordings_own_time(opened: Callable[...
     assert report.scale("history") == pytest.approx((2.5, 2.5 + (plain.target.size - 1) / 200.0))
 
 
+def test_a_large_offset_costs_the_curves_no_resolution(opened: Callable[..., Opened]) -> None:
+    target, measured = examples.synthetic(4000)
+    moved = examples.judged(1e5 + target / 1e3, 1e5 + measured / 1e3, 200.0)
+    report = opened(moved)
+    error = (measured - target) / 1e3
+    drawn = np.array(report.column("error", 1))
+    # single precision of values at 1e5 would be steps of 0.008, as large as the motion itself
+    np.testing.assert_allclose(drawn, error, atol=1e-6 * float(np.ptp(target / 1e3)))
+
+
 def test_windows_that_cannot_be_judged_are_gaps(opened: Callable[..., Opened], plain: Assessment) -> None:
     report = opened(plain)
     moving = plain.moving

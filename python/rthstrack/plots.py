@@ -169,7 +169,7 @@ def plot_spectra(assessment: Assessment, *, ax: Axes | None = None) -> Axes:
         weight_axis = ax.twinx()
         weight_axis.fill_between(frequency, weights, color=SECOND, alpha=0.3, linewidth=0)
         weight_axis.set_ylim(0, 1.15 * float(weights[inside].max(initial=0.0)) or 1.0)
-        weight_axis.set_ylabel("Weight of a bin (\N{EN DASH})", color=SECOND)
+        weight_axis.set_ylabel("Weight of a bin (-)", color=SECOND)
         weight_axis.tick_params(axis="y", colors=SECOND)
         weight_axis.spines["right"].set_visible(True)
         weight_axis.spines["right"].set_color(SECOND)
@@ -223,9 +223,9 @@ def plot_frequency_response(
         coherence_axis.axhline(display.LOW_COHERENCE, color=MUTED, linewidth=0.5, linestyle=(0, (1, 2)))
         coherence_axis.set_ylim(0, 1.05)
         _limit_lines(gain_axis, delay_axis, limits)
-        gain_axis.set_ylabel("Gain (\N{EN DASH})")
+        gain_axis.set_ylabel("Gain (-)")
         delay_axis.set_ylabel("Delay (ms)")
-        coherence_axis.set_ylabel("Coherence (\N{EN DASH})")
+        coherence_axis.set_ylabel("Coherence (-)")
         for axis in ax:
             _frequency_axis(axis, low, high)
             if isinstance(result, Assessment):
@@ -265,7 +265,7 @@ def plot_moving(
                 float(assessment.tracking.delay_s) * 1e3, color=VALUE, linewidth=0.6, linestyle=(0, (1, 2))
             )
             _limit_lines(amplitude_axis, delay_axis, assessment.limits)
-        amplitude_axis.set_ylabel("A (\N{EN DASH})")
+        amplitude_axis.set_ylabel("A (-)")
         delay_axis.set_ylabel("d (ms)")
         for axis in ax:
             if assessment is not None:

@@ -345,7 +345,7 @@ def _told(columns: Sequence[_TimeColumn], stated: _Rate | None, file: str) -> _R
                 "name one with --time",
             )
     notes = [f"{c.what} {v.problem}; it was not used" for c, v in irregular]
-    if first.high_hz - first.low_hz > 2e-3 * first.rate_hz:
+    if first.rounded and first.high_hz - first.low_hz > 2e-3 * first.rate_hz:
         notes.append(
             f"{column.what} is rounded: any rate from {first.low_hz:.6g} to {first.high_hz:.6g} Hz fits it; "
             "give --rate HZ if you know better"
@@ -519,7 +519,7 @@ def _select(selector: str, channels: Sequence[tuple[str, str]], file: str) -> in
         raise ChannelError(
             f"{file}: no channel '{selector}': there are {len(channels)}, #0 to #{len(channels) - 1}: {listed}"
         )
-    names = {loose(text): text for both in channels for text in both}
-    near = [f"'{names[n]}'" for n in difflib.get_close_matches(loose(selector), names, n=3)]
-    meant = f" (did you mean {' or '.join(near)}?)" if near else ""
+    by_text = {loose(text): i for i, both in enumerate(channels) for text in both}
+    near = dict.fromkeys(by_text[text] for text in difflib.get_close_matches(loose(selector), by_text, n=3))
+    meant = f" (did you mean {' or '.join(repr(channels[i][0]) for i in near)}?)" if near else ""
     raise ChannelError(f"{file}: no channel '{selector}'{meant}; there are: {listed}")

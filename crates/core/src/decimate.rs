@@ -26,7 +26,7 @@ use pulp::Simd;
 use crate::error::{Error, Result};
 
 /// Rejection of what would alias onto a kept bin, relative to the gain of that bin, in decibels.
-pub const ALIAS_DB: f64 = 200.0;
+pub const ALIAS_DB: f64 = 180.0;
 
 /// Halvings that share one pass: eight samples in, one out.
 const MAX_HALVINGS: usize = 3;
@@ -37,7 +37,7 @@ const IN_FLIGHT: usize = 8;
 /// Samples that these take at most.
 const MAX_BLOCK: usize = IN_FLIGHT * LANES;
 /// Below this many points a transform is cheaper than another pass.
-const SHORTEST: usize = 256;
+const SHORTEST: usize = 512;
 
 /// How P is carried out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -234,12 +234,36 @@ impl Pass {
                         acc[v] = simd.mul_add_e_f64s(taps[v % taps.len()], x[v], acc[v]);
                     }
                 }
-                sums.copy_from_slice(&acc);
+                // Where an output spans several vectors, their sum.
+                let (mut left, mut stride) = (IN_FLIGHT, D);
+                while stride > S::F64_LANES {
+                    let per_output = stride / S::F64_LANES;
+                    for v in 0..left / 2 {
+                        let (output, part) = (v / (per_output / 2), v % (per_output / 2));
+                        let at = output * per_output + part;
+                        acc[v] = simd.add_f64s(acc[at], acc[at + per_output / 2]);
+                    }
+                    (left, stride) = (left / 2, stride / 2);
+                }
+                sums[..left].copy_from_slice(&acc[..left]);
             }
-            for (y, part) in strip.iter_mut().zip(lanes.chunks_exact(D)) {
-                *y = sum_by_halves::<D>(part);
+            for (y, sums) in strip.chunks_mut(per_block).zip(lanes.chunks_exact(IN_FLIGHT * S::F64_LANES)) {
+                match D.min(S::F64_LANES) {
+                    1 => y.copy_from_slice(&sums[..y.len()]),
+                    2 => sum_each::<2>(sums, y),
+                    4 => sum_each::<4>(sums, y),
+                    _ => sum_each::<8>(sums, y),
+                }
             }
         }
+    }
+}
+
+/// The sums of D neighbouring lanes each.
+#[inline(always)]
+fn sum_each<const D: usize>(lanes: &[f64], out: &mut [f64]) {
+    for (y, part) in out.iter_mut().zip(lanes.chunks_exact(D)) {
+        *y = sum_by_halves::<D>(part);
     }
 }
 

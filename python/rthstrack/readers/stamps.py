@@ -23,12 +23,16 @@ _ROUND_OFF = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Uniform:
-    """Stamps of uniform sampling. `low_hz` and `high_hz` bound the rates that the stamps allow."""
+    """Stamps of uniform sampling. `low_hz` and `high_hz` bound the rates that the stamps allow.
+
+    `rounded` says that the steps are uneven, as rounding makes them.
+    """
 
     rate_hz: float
     low_hz: float
     high_hz: float
     start_s: float
+    rounded: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +76,8 @@ def _examine(stamps: NDArray[np.float64], unit_s: float) -> Uniform | Irregular:
     off = float(np.abs(stamps - middle - slope * index).max())
     quantum = _quantum(stamps)
     round_off = 8 * float(np.finfo(float).eps) * float(np.abs(stamps).max())
-    if slope > 0 and off <= _JITTER * slope:
+    rounded = not (slope > 0 and off <= _JITTER * slope)
+    if not rounded:
         spread = max(2 * off, quantum) + round_off
         shortest, longest = slope - spread / (n - 1), slope + spread / (n - 1)
     elif quantum > 0 and _evenly_odd(steps, quantum):
@@ -88,7 +93,7 @@ def _examine(stamps: NDArray[np.float64], unit_s: float) -> Uniform | Irregular:
     rate = 1 / (slope * unit_s)
     if not 1e-12 < rate < 1e12:
         return _describe(stamps, steps, unit_s)
-    return Uniform(_nice(rate, low, high), low, high, float(stamps[0]) * unit_s)
+    return Uniform(_nice(rate, low, high), low, high, float(stamps[0]) * unit_s, rounded)
 
 
 def _quantum(stamps: NDArray[np.float64]) -> float:

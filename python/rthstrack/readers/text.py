@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 # A number by decimal mark; a comma between groups of three digits only in `key: 1,000`.
 _NUMBERS = {mark: rf"[-+]?(?:\d+(?:[{mark}]\d*)?|[{mark}]\d+)(?:[eEdD][-+]?\d+)?" for mark in ".,"}
-_GROUPED = r"(?<=[:=\s])\d{1,3}(?:,\d{3})+(?:\.\d*)?(?![\d,])"
+_GROUPED = r"(?<=[:=;\s])\d{1,3}(?:,\d{3})+(?:\.\d*)?(?![\d,])"
 _RATE_KEY = (
     r"(?:sampl(?:e|es|ing)|scan|acquisition|acq|daq|data|logging|log|recording)[ _-]*(?:rate|freq(?:uency)?)(?:[ _]hz)?"
     r"|(?:abtast|mess)(?:rate|frequenz)|fr[ée]quence d.[ée]chantillonnage|frecuencia de muestreo|rate_hz|fs"
@@ -33,9 +33,10 @@ _STEP_KEY = (
 
 def _statement(key: str, mark: str) -> re.Pattern[str]:
     """The words, perhaps a unit in brackets, a separator, a number, perhaps a unit (and not the next key)."""
+    number = _NUMBERS[mark] if mark == "," else f"{_GROUPED}|{_NUMBERS[mark]}"
     return re.compile(
         rf"(?<![a-zäöüé_])(?P<key>{key})\s*(?:[\[(]\s*(?P<unit>[^\])]{{1,12}})[\])])?\s*[:=,;\t ]\s*[\"']?\s*"
-        rf"(?P<value>{_GROUPED}|{_NUMBERS[mark]})(?:[ ]*(?P<behind>[a-zµ1][a-zµ/1]*)(?!\s*[:=\w]))?",
+        rf"(?P<value>{number})(?:[ ]*(?P<behind>[a-zµ1][a-zµ/1]*)(?!\s*[:=\w]))?",
         re.IGNORECASE,
     )
 
