@@ -194,7 +194,7 @@ def test_the_results_block_holds_the_numbers_in_full(opened: Callable[..., Opene
     assert result["warnings"] == list(plain.warnings)
     assert result["exceeded"] == list(plain.exceeded)
     assert result["settings"]["weight_power"] == 2
-    assert result["settings"]["rate_from"] == "time column t_s"
+    assert result["settings"]["rate_source"] == "time column t_s"
     assert plain.moving is not None
     assert result["moving"]["n_valid"] == int(plain.moving.valid.sum())
     assert results["program"]["name"] == "rthstrack"
@@ -411,14 +411,12 @@ def test_what_is_not_determined_says_so_and_why(opened: Callable[..., Opened]) -
     assert report.text("delay_s").startswith("not determined")
     assert "no finite number" in report.text("delay_s")
     assert "needs the measured force" in report.text("energy_error")
-    assert bare.moving_note is not None
-    assert bare.moving_note in report.text("moving")
-    assert bare.response_note is not None
-    assert bare.response_note in report.text("response")
+    assert report.text("moving") == "A(t) and d(t) not determined: the record is shorter than two windows"
+    assert report.text("response").endswith("not determined: the record is too short for two segments")
     (result,) = report.results()["results"]
     assert result["delay_s"] is None
     assert result["moving"] is None
-    assert result["not_determined"]["moving"] == bare.moving_note
+    assert result["not_determined"]["moving"] == "the record is shorter than two windows"
     assert "NaN" not in report.page.locator("main").inner_text()
 
 
@@ -500,8 +498,8 @@ def test_settings_program_and_date_are_in_a_table(opened: Callable[..., Opened],
 
     assert setting("weight_power") == "2"
     assert setting("band_hz") == "none"
-    assert setting("rate_from") == "time column t_s"
-    assert setting("start_s") == "2.5 s"
+    assert setting("rate_source") == "time column t_s"
+    assert setting("first_sample") == "2.5 s"
     assert setting("program").startswith("rthstrack ")
     assert re.match(r"\d{4}-\d\d-\d\d \d\d:\d\d", setting("created"))
     banded = examples.judged(

@@ -200,7 +200,7 @@ def plot_frequency_response(
         gain_axis, delay_axis, coherence_axis = ax
         if response is None:
             for one in ax:
-                _note(one, f"not determined: {result.response_note if isinstance(result, Assessment) else ''}")
+                _note(one, (result.response_note if isinstance(result, Assessment) else None) or "not determined")
             return ax
         above_zero = response.frequency_hz > 0
         frequency, coherence = response.frequency_hz[above_zero], response.coherence[above_zero]
@@ -248,7 +248,7 @@ def plot_moving(
         amplitude_axis, delay_axis = ax
         if moving is None:
             for one in ax:
-                _note(one, f"not determined: {assessment.moving_note if assessment else ''}")
+                _note(one, (assessment.moving_note if assessment else None) or "not determined")
             return ax
         time_s = moving.time_s + (assessment.start_s if assessment else 0.0)
         amplitude = np.where(moving.valid, moving.amplitude, np.nan)

@@ -56,7 +56,14 @@ _SETTING_NAMES = {
     "window": "Window",
     "detrend": "Detrend",
     "band_hz": "Band",
-    "rate_hz": "Rate",
+    "moving_s": "Moving windows",
+    "hop_s": "One moving window every",
+    "rate_source": "Rate from",
+    "start_s": "Cut before",
+    "end_s": "Cut after",
+    "n_filled": "Filled samples",
+    "fill": "Fill gaps up to (samples)",
+    "resample_hz": "Resampled to",
 }
 
 
@@ -204,10 +211,15 @@ def _reasons(a: Assessment) -> dict[str, str]:
         elif not math.isfinite(value):
             reasons[index.name] = "the evaluation gave no finite number"
     if a.moving is None:
-        reasons["moving"] = a.moving_note or "was not evaluated"
+        reasons["moving"] = _why(a.moving_note)
     if a.response is None:
-        reasons["response"] = a.response_note or "was not evaluated"
+        reasons["response"] = _why(a.response_note)
     return reasons
+
+
+def _why(note: str | None) -> str:
+    """A note of the assessment as the reason alone; what it is the reason for is said where it is shown."""
+    return (note or "was not evaluated").removeprefix(f"{NOT_DETERMINED}: ")
 
 
 def _plain(value: Any) -> Any:
@@ -258,7 +270,10 @@ def _setting(name: str, value: Any) -> tuple[str, str]:
     unit = next((u for end, u in (("_hz", "Hz"), ("_s", "s"), ("_percent", "%")) if name.endswith(end)), "")
     plain = name.removesuffix("_hz").removesuffix("_percent")
     plain = plain.removesuffix("_s").replace("_", " ")
-    label = _SETTING_NAMES.get(name, plain[:1].upper() + plain[1:])
+    first, _, rest = name.partition(" · ")
+    label = _SETTING_NAMES.get(first, plain[:1].upper() + plain[1:])
+    if rest and first in _SETTING_NAMES:
+        label = f"{label}: {rest}"
     if value is None or value == [] or value == ():
         return label, "none"
     if isinstance(value, bool):
@@ -683,7 +698,7 @@ def _thinned(drawing: Mapping[str, Any], points: str) -> str:
 def _time_charts(a: Assessment, drawing: Mapping[str, Any]) -> str:
     target_role, measured_role = display.signal_roles(a.part)
     if a.moving is None or drawing["moving"] is None:
-        reason = a.moving_note or "there is no reading"
+        reason = _why(a.moving_note) if a.moving is None else "there is no reading"
         moving = f'<p class="absent" data-field="moving">A(t) and d(t) {NOT_DETERMINED}: {escape(reason)}</p>'
     else:
         m = a.moving
@@ -736,7 +751,7 @@ def _frequency_charts(a: Assessment, drawing: Mapping[str, Any]) -> str:
         right = _chart("gain", "Gain over frequency") + _chart("delay", "Delay over frequency")
         right += _chart("coherence", "Coherence over frequency", text + _thinned(drawing["response"], "bins"))
     else:
-        reason = a.response_note or "there is no frequency above zero"
+        reason = _why(a.response_note) if a.response is None else "there is no frequency above zero"
         right = (
             f'<p class="absent" data-field="response">Gain, delay and coherence over frequency {NOT_DETERMINED}: '
             f"{escape(reason)}</p>"
@@ -754,15 +769,12 @@ def _settings_table(a: Assessment, version: str, created: datetime) -> str:
     settings = {**dataclasses.asdict(a.tracking.settings), **a.settings}
     rows = [
         ("file", "File", a.file),
-        ("start_s", "Start of the evaluated part", f"{a.start_s:.6g} s"),
-        ("duration_s", "Duration", f"{a.target.size / a.rate_hz:.6g} s"),
+        ("rate", "Rate", f"{a.rate_hz:.6g} Hz"),
+        ("first_sample", "First sample at", f"{a.start_s:.6g} s"),
+        ("duration", "Duration", f"{a.target.size / a.rate_hz:.6g} s"),
         ("unit", "Unit", a.unit or "not stated"),
     ]
     rows += [(name, *_setting(name, value)) for name, value in _flat(settings)]
-    if a.moving is not None:
-        m = a.moving
-        text = f"{m.window_s:.4g} s, one every {m.hop_s:.4g} s, {m.settings.window}"
-        rows.append(("moving", "Moving window", text))
     if a.response is not None:
         r = a.response
         text = (

@@ -30,7 +30,7 @@ _OFFSET_STD = 0.25
 _HIGH_SHARE, _HIGH_FACTOR = 0.02, 8.0
 _LOW_COHERENCE = 0.9
 _FEW_LEVELS = 64
-_CLIPPED_RUN, _CLIPPED_STD = 5, 1.5
+_CLIPPED_RUN, _CLIPPED_STD, _CLIPPED_STEPS = 5, 1.5, 3
 _ODD_AMPLITUDE = 3.0
 # Spread of the delay over the frequencies that carry the weight, as a share of the delay.
 _DELAY_SPREAD = 0.2
@@ -206,16 +206,23 @@ def _delay_spread(tracking: Tracking, response: FrequencyResponse | None) -> str
 
 
 def _clipped(signal: NDArray[np.float64], name: str) -> str | None:
+    """A signal that runs into its extreme at speed and stays there; a quantised peak comes in by single steps."""
     mean, spread = float(signal.mean()), float(signal.std())
+    steps = np.abs(np.diff(signal))
+    if not steps.any():
+        return None
+    fast = _CLIPPED_STEPS * float(steps[steps > 0].min())
     for extreme in (float(signal.max()), float(signal.min())):
         if abs(extreme - mean) < _CLIPPED_STD * spread:
             continue
-        at = signal == extreme
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], at, [False])).astype(np.int8)))
-        runs = edges[1::2] - edges[::2]
-        n_clipped = int(runs[runs >= _CLIPPED_RUN].sum())
-        if n_clipped:
-            return f"{name} stays at its extreme {extreme:g} for {n_clipped} samples in a row or more: clipped?"
+        at = np.concatenate(([False], signal == extreme, [False]))
+        edges = np.flatnonzero(np.diff(at.astype(np.int8)))
+        starts, ends = edges[::2], edges[1::2]
+        hits = (ends - starts >= _CLIPPED_RUN) & (starts > 0) & (ends < signal.size)
+        hits[hits] &= (steps[starts[hits] - 1] > fast) | (steps[ends[hits] - 1] > fast)
+        if hits.any():
+            n_clipped = int((ends - starts)[hits].sum())
+            return f"{name} looks clipped: {n_clipped} samples stay exactly at its extreme {extreme:g}"
     return None
 
 

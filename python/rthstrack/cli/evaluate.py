@@ -10,7 +10,6 @@ import math
 import os
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -221,7 +220,7 @@ def _assess(
     said = list(assessment.warnings)
     if proposal is not None and part == "whole":
         said.insert(0, f"no channels were named: judged target '{asked.name}', measured '{answered.name}' ({proposal})")
-    said += [f"{recording.file}: {note}" for note in recording.notes] if part == "whole" else []
+    said += recording.notes if part == "whole" else ()
     return dataclasses.replace(assessment, warnings=tuple(said))
 
 

@@ -141,7 +141,8 @@ def _plain(unit: str) -> str:
 def is_unit(text: str) -> bool:
     """Whether a text is a unit: a known symbol, or known symbols with powers, joined by / * . or ^."""
     parts = [part for part in re.split(r"[/*·.^ ]+|(?<=[a-zµ%°])(?=[-²³\d])", _plain(text)) if part]
-    return bool(parts) and all(part in _BASE or re.fullmatch(r"-?[0-9²³]|1", part) for part in parts)
+    known = [part in _BASE for part in parts]
+    return any(known) and all(k or re.fullmatch(r"-?[0-9²³]", part) for k, part in zip(known, parts, strict=True))
 
 
 def length_factor(unit_a: str | None, unit_b: str | None) -> float | None:
@@ -163,7 +164,8 @@ def is_length(unit: str | None) -> bool:
 def split_unit(name: str) -> tuple[str, str | None]:
     """A channel's name without its unit, and the unit: from `Disp (mm)`, `Disp [mm]`, `Disp, mm` or `disp_mm`."""
     found = re.fullmatch(r"(.*\S)\s*\[([^\[\]]{1,16})\]", name)
-    if found:
+    # An index ([:,0]) is no unit.
+    if found and re.search(r"[^\W\d_]|[%°-]", found[2]):
         return found[1], found[2].strip()
     found = re.fullmatch(r"(.*\S)\s*\(([^()]{1,16})\)", name) or re.fullmatch(r"(.*\S)\s*,\s+(\S{1,8})", name)
     if found and is_unit(found[2]):
