@@ -394,7 +394,7 @@ impl Cascade {
     /// centred on sample factor * i. `None` where windows cannot share it.
     pub(crate) fn stream<S: Simd>(&self, simd: S, samples: &[f64], window: usize, hop: usize) -> Option<Stream> {
         let pass = self.passes.first()?;
-        if hop % pass.factor != 0 || window <= 2 * pass.reach + pass.factor || window > self.n {
+        if !hop.is_multiple_of(pass.factor) || window <= 2 * pass.reach + pass.factor || window > self.n {
             return None;
         }
         let n_out = samples.len().div_ceil(pass.factor);

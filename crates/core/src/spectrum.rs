@@ -72,10 +72,10 @@ impl Spectrum {
                 return Err(Error::NotPowerOfTwo { name, found: factor });
             }
         }
-        if let Some((low_hz, high_hz)) = config.band_hz {
-            if !(low_hz.is_finite() && high_hz.is_finite() && 0.0 <= low_hz && low_hz <= high_hz) {
-                return Err(Error::Band { low_hz, high_hz });
-            }
+        if let Some((low_hz, high_hz)) = config.band_hz
+            && !(low_hz.is_finite() && high_hz.is_finite() && 0.0 <= low_hz && low_hz <= high_hz)
+        {
+            return Err(Error::Band { low_hz, high_hz });
         }
         let fft_len = n_samples.next_power_of_two();
         let delta_f = rate_hz / fft_len as f64 * frequency_decimation as f64;

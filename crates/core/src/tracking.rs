@@ -326,7 +326,7 @@ pub fn delay(phase_rad: f64, frequency_hz: f64) -> f64 {
 #[inline(always)]
 fn weight(squared: f64, power: u32) -> f64 {
     let even = squared.powi((power / 2) as i32);
-    if power % 2 == 0 { even } else { even * squared.sqrt() }
+    if power.is_multiple_of(2) { even } else { even * squared.sqrt() }
 }
 
 /// The sums of Eqs 7 and 12, frequency in bins.

@@ -44,7 +44,10 @@ fn by_definition(target: &[f64], measured: &[f64], config: &EvaluatorConfig) -> 
     };
     let (target, measured) = (prepare(target), prepare(measured));
     let bin = |x: &[f64], k: usize| -> Complex<f64> {
-        x.iter().enumerate().map(|(i, v)| v * Complex::from_polar(1.0, -2.0 * PI * ((k * i) % n) as f64 / n as f64)).sum()
+        x.iter()
+            .enumerate()
+            .map(|(i, v)| v * Complex::from_polar(1.0, -2.0 * PI * ((k * i) % n) as f64 / n as f64))
+            .sum()
     };
     let (mut cross, mut power, mut moment, mut n_bins) = (Complex::new(0.0, 0.0), 0.0, 0.0, 0);
     let mut k = config.frequency_decimation;
@@ -160,8 +163,7 @@ fn without_decimation_the_real_part_is_that_of_the_time_domain() {
     for len in [5, 128, 999] {
         let (target, measured) = pair(len);
         let n = len.next_power_of_two() as f64;
-        let alternating =
-            |x: &[f64]| x.iter().enumerate().map(|(i, v)| if i % 2 == 0 { *v } else { -v }).sum::<f64>();
+        let alternating = |x: &[f64]| x.iter().enumerate().map(|(i, v)| if i % 2 == 0 { *v } else { -v }).sum::<f64>();
         let product = |x: &[f64], y: &[f64]| {
             x.iter().zip(y).map(|(a, b)| a * b).sum::<f64>() - x.iter().sum::<f64>() * y.iter().sum::<f64>() / n
                 + alternating(x) * alternating(y) / n

@@ -15,7 +15,8 @@ use rthstrack_text::Values;
 /// Raises ValueError, one line, where the bytes are not such text.
 #[pyfunction]
 fn read_text<'py>(py: Python<'py>, content: &[u8]) -> PyResult<Bound<'py, PyDict>> {
-    let table = py.detach(|| rthstrack_text::read(content)).map_err(|error| PyValueError::new_err(error.to_string()))?;
+    let table =
+        py.detach(|| rthstrack_text::read(content)).map_err(|error| PyValueError::new_err(error.to_string()))?;
     let mut columns = Vec::with_capacity(table.columns.len());
     for column in table.columns {
         let (kind, values) = match column.values {

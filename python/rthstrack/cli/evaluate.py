@@ -360,7 +360,8 @@ def _write_csv(path: Path, rows: Sequence[dict[str, Any]]) -> None:
 def _print_text(results: Sequence[Sequence[Assessment]], n_files: int) -> None:
     from rich.console import Console
 
-    console = Console(highlight=False, soft_wrap=True)
+    # Into a file or pipe nothing is folded at a terminal's width.
+    console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 200)
     if n_files == 1:
         for a in (a for found in results for a in found):
             _print_one(console, a)

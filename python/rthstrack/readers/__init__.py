@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import struct
 import warnings
@@ -12,7 +13,6 @@ from typing import TYPE_CHECKING
 from rthstrack.errors import RecordingError
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Callable
 
     from rthstrack.readers.contents import Contents
@@ -50,24 +50,49 @@ def read_contents(path: str | os.PathLike[str]) -> Contents:
             warnings.simplefilter("always")
             contents = reader(file)
     except RecordingError as error:
-        raise RecordingError(f"{path}: {error}") from error.__cause__
+        raise _error(path, error) from error.__cause__
     except OSError as error:
-        raise RecordingError(f"{path}: {_one_line(error.strerror or error)}") from error
+        raise _error(path, error.strerror or _first_line(error)) from error
     except ImportError as error:
-        raise RecordingError(f"{path}: this format needs the package {error.name}, which cannot be imported") from error
+        raise _error(path, f"this format needs the package {error.name}, which cannot be imported") from error
     except MemoryError as error:
-        raise RecordingError(f"{path}: more than the memory holds; the file is damaged or too large") from error
+        raise _error(path, "more than the memory holds; the file is damaged or too large") from error
     except Exception as error:
-        cause = _one_line(error) or type(error).__name__
-        raise RecordingError(f"{path}: damaged, or not as its format demands: {cause}") from error
-    notes = _summed([*contents.notes, *(_one_line(w.message) for w in caught)])
+        raise _error(path, f"damaged, or not as its format demands: {_first_line(error)}") from error
+    notes = _summed([*contents.notes, *(_first_line(w.message) for w in caught)])
     if not contents.series:
         found = "; ".join(notes[:3]) or "nothing of the kind"
-        raise RecordingError(f"{path}: no channels; expected vectors of numbers ({contents.format}), found: {found}")
+        raise _error(path, f"no channels; expected vectors of numbers ({contents.format}), found: {found}")
     ending = file.suffix.lower()
     if any(ending in endings for endings in _ENDINGS.values()) and ending not in _ENDINGS[kind]:
         notes.append(f"named {file.suffix}, but the content is {contents.format}")
-    return replace(contents, notes=tuple(notes))
+    return replace(
+        contents,
+        series=tuple(replace(s, name=_printable(s.name), path=_printable(s.path)) for s in contents.series),
+        clocks=tuple(replace(c, name=_printable(c.name), path=_printable(c.path)) for c in contents.clocks),
+        notes=tuple(map(_printable, notes)),
+    )
+
+
+def _error(path: str | os.PathLike[str], what: object) -> RecordingError:
+    """One printable line that begins with the file."""
+    line = _printable(f"{os.fspath(path)}: {what}")
+    return RecordingError(line if len(line) <= 1000 else line[:997] + "...")
+
+
+def _printable(text: str) -> str:
+    """Text from a file, which may be damaged, with control characters escaped."""
+    return (
+        text
+        if text.isprintable()
+        else "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+    )
+
+
+def _first_line(cause: object) -> str:
+    """The first line of an exception or warning that says something."""
+    lines = (line.strip() for line in str(cause).splitlines())
+    return next((line for line in lines if line), type(cause).__name__)
 
 
 def _summed(notes: list[str]) -> list[str]:
@@ -84,12 +109,6 @@ def _summed(notes: list[str]) -> list[str]:
             listed = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
             said.append(f"{listed} {rest}" if len(names) == 1 else f"{listed}: each {rest}")
     return said
-
-
-def _one_line(cause: object) -> str:
-    """The first line of a cause that says something, without the file's own newlines or endless length."""
-    line = next((line.strip() for line in str(cause).splitlines() if line.strip()), "")
-    return line if len(line) <= 300 else line[:297] + "..."
 
 
 def _reader(file: Path) -> tuple[str, Callable[[Path], Contents]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import logging
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +15,7 @@ from rthstrack.readers.arrays import as_float, clock, is_numeric, rate_of, tidy,
 from rthstrack.readers.contents import Clock, Contents, RateStatement, Series
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
 
@@ -23,7 +26,7 @@ def read(path: Path) -> Contents:
     clocks: list[Clock] = []
     statements: list[RateStatement] = []
     notes: list[str] = []
-    with TdmsFile.open(path) as file:
+    with path.open("rb") as raw, _told(notes), TdmsFile.open(raw) as file:
         if file.file_status.incomplete_final_segment:
             raise RecordingError("truncated: its last segment is incomplete")
         for source, properties in [("", file.properties), *((g.name, g.properties) for g in file.groups())]:
@@ -45,6 +48,22 @@ def read(path: Path) -> Contents:
                     series.append(Series(channel.name, name, unit, as_float(values)))
                     statements += _increment(name, channel.properties)
     return Contents("TDMS", tuple(series), tuple(clocks), tuple(statements), tuple(notes))
+
+
+@contextlib.contextmanager
+def _told(notes: list[str]) -> Iterator[None]:
+    """What the library logs to the terminal, as notes."""
+    handler = logging.Handler(logging.WARNING)
+    handler.emit = lambda record: notes.append(record.getMessage())  # type: ignore[method-assign]
+    loggers = [logging.getLogger(name) for name in list(logging.root.manager.loggerDict) if name.startswith("nptdms")]
+    before = [(logger, logger.handlers, logger.propagate) for logger in loggers]
+    try:
+        for logger in loggers:
+            logger.handlers, logger.propagate = [handler], False
+        yield
+    finally:
+        for logger, handlers, propagate in before:
+            logger.handlers, logger.propagate = handlers, propagate
 
 
 def _increment(name: str, properties: Any) -> list[RateStatement]:
