@@ -128,8 +128,8 @@ toolchain:
 
 .venv/ready: constraints.txt
 	@command -v $(PYTHON) > /dev/null || { echo "make: $(PYTHON) not found: Python 3.11 or newer is needed"; exit 1; }
-	@$(PYTHON) -c 'import sys; v = sys.version_info; \
-		sys.exit(f"make: $(PYTHON) is Python {v[0]}.{v[1]}: 3.11 or newer is needed (make PYTHON=...)" if v < (3, 11) else 0)'
+	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; v >= (3, 11) or sys.exit("make: $(PYTHON) is Python %d.%d: \
+	3.11 or newer is needed, choose one with make PYTHON=python3.x ..." % v)'
 	@$(BIN)/python -m pip --version > /dev/null 2>&1 || $(PYTHON) -m venv .venv \
 		|| { echo "make: '$(PYTHON) -m venv .venv' failed (Debian: apt-get install python3-venv)"; exit 1; }
 	$(call say,virtual environment)

@@ -242,6 +242,8 @@ def correlation_lag(target: ArrayLike, measured: ArrayLike, rate_hz: float, max_
     best, best_lag = -math.inf, 0
     for k in range(-K, K + 1):
         i, o = (I[: N - k], O[k:]) if k >= 0 else (I[-k:], O[: N + k])
+        if np.ptp(i) == 0 or np.ptp(o) == 0:
+            continue  # a constant correlates with nothing
         correlation = float(np.corrcoef(i, o)[0, 1])
         if correlation > best:
             best, best_lag = correlation, k

@@ -71,6 +71,14 @@ def test_the_strongest_part_is_where_the_burst_is_whatever_the_offset() -> None:
     assert display.strongest_span(target[:300], rate_hz=100.0, span_s=4.0) == (0, 300)
 
 
+def test_rest_far_from_the_mean_is_not_the_strongest_part() -> None:
+    target = 0.1 * np.sin(np.arange(10_000) / 8) - 0.2
+    target[:1_000] = 0.0
+    target[7_000:7_400] += 0.1 * np.sin(np.arange(400) / 8 + 7_000 / 8)
+    first, _ = display.strongest_span(target, rate_hz=100.0, span_s=4.0)
+    assert first == pytest.approx(7_000, abs=20)
+
+
 def test_the_frequencies_shown_first_hold_the_weight_and_stay_within_the_bins() -> None:
     frequency = np.arange(1, 1001) * 0.1
     weights = np.zeros(1000)

@@ -24,7 +24,13 @@ def _environment(root: Path) -> dict[str, str]:
     """The caller's, less what would let the new environment see this one; the build's own tools pinned too."""
     kept = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")}
     pins = str(root / "constraints.txt")
-    return {**kept, "PIP_CONSTRAINT": pins, "PIP_BUILD_CONSTRAINT": pins, "PIP_DISABLE_PIP_VERSION_CHECK": "1"}
+    return {
+        **kept,
+        "PIP_CONSTRAINT": pins,
+        "PIP_BUILD_CONSTRAINT": pins,
+        "PIP_DISABLE_PIP_VERSION_CHECK": "1",
+        "PIP_NO_COMPILE": "1",
+    }
 
 
 def _run(*command: str | Path, cwd: Path, root: Path) -> str:

@@ -63,9 +63,9 @@ def test_matlab_vectors_and_matrices_are_channels_in_matlabs_words(tmp_path: Pat
 
 
 def test_nested_structs_struct_arrays_and_cells_are_walked(tmp_path: Path) -> None:
-    data = np.empty((1, 2), dtype=[("values", "O"), ("label", "O"), ("unit", "O")])
-    data[0, 0] = (np.column_stack([TARGET, MEASURED]), "both", "mm")
-    data[0, 1] = (TARGET, "target disp", "mm")
+    data = np.empty((1, 2), dtype=[("values", "O"), ("label", "O"), ("unit", "O"), ("raw", "O")])
+    data[0, 0] = (np.column_stack([TARGET, MEASURED]), "both", "mm", 0)
+    data[0, 1] = (TARGET, "target disp", "mm", MEASURED)
     cell = np.empty((1, 2), dtype=object)
     cell[0, 0], cell[0, 1] = TARGET, "text"
     recording = read_recording(
@@ -77,6 +77,7 @@ def test_nested_structs_struct_arrays_and_cells_are_walked(tmp_path: Path) -> No
         ("data(1).values(:,1)", "data(1).values(:,1)", "mm", 100),
         ("data(1).values(:,2)", "data(1).values(:,2)", "mm", 100),
         ("target disp", "data(2).values", "mm", 100),
+        ("data(2).raw", "data(2).raw", None, 100),
         ("s.disp.target", "s.disp.target", None, 100),
         ("c{1}", "c{1}", None, 100),
     ]

@@ -134,6 +134,7 @@ def test_a_header_states_the_rate(tmp_path: Path, line: str, rate: float | None,
         ("Elapsed Time", "sec", "0.02", 50.0),
         ("Running Time", "min", "0.001", 1 / 0.06),
         ("T", "", "0.25", 4.0),
+        ("T", "", "0", None),
         ("t", "mm", "0.01", None),
         ("Time delay (ms)", "", "0", None),
         ("Temperature", "", "0.1", None),
@@ -251,6 +252,7 @@ def test_exact_stamps_in_double_and_single_precision_give_the_round_rate() -> No
         np.linspace(0, 90, 90001),
         np.cumsum(np.full(90001, 0.001)),
         (np.arange(200001) / 1000).astype(np.float32).astype(float),
+        (np.arange(1000001) / 1000).astype(np.float32).astype(float),
         np.arange(90001) / 1000.0000002,
     ):
         found = examine(stamps)

@@ -490,6 +490,14 @@ def test_dark_surroundings_and_white_paper(opened: Callable[..., Opened], plain:
     assert report.page.evaluate(ground) == "rgb(255, 255, 255)"
 
 
+def test_no_window_is_too_narrow_for_the_page(opened: Callable[..., Opened]) -> None:
+    report = opened(*examples.parts_of_a_test(Limits(delay_s=0.02)))
+    for width in (1400, 800, 390):
+        report.page.set_viewport_size({"width": width, "height": 900})
+        report.page.wait_for_function("document.querySelector('[data-chart=history]').chart.u.width < innerWidth")
+        assert report.page.evaluate("document.documentElement.scrollWidth") == width
+
+
 def test_settings_program_and_date_are_in_a_table(opened: Callable[..., Opened], plain: Assessment) -> None:
     report = opened(plain)
 
@@ -563,6 +571,11 @@ def test_a_file_name_that_is_not_text_can_be_reported(tmp_path: Path) -> None:
     odd = examples.judged(*examples.synthetic(2000), 200.0, file="run_\udcff.csv")
     write_report([odd], tmp_path / "odd.html")
     assert "run_?.csv" in html.unescape((tmp_path / "odd.html").read_text(encoding="utf-8"))
+
+
+def test_samples_without_a_file_are_called_that() -> None:
+    page = report_html([examples.judged(*examples.synthetic(2000), 200.0, file="")])
+    assert "<title>Tracking in samples given in Python</title>" in page
 
 
 def test_the_vendored_files_are_those_that_the_note_beside_them_names() -> None:

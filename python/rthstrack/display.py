@@ -65,12 +65,14 @@ def fourier_scale(tracking: Tracking) -> float:
 
 
 def strongest_span(target: NDArray[np.float64], rate_hz: float, span_s: float = STRONGEST_S) -> tuple[int, int]:
-    """First and one-past-last sample of the `span_s` seconds in which the target moves most (mean removed)."""
+    """First and one-past-last sample of the `span_s` seconds in which the target varies most about their own mean."""
     n = round(span_s * rate_hz)
     if n < 1 or n >= target.size:
         return 0, target.size
-    energy = np.concatenate(([0.0], np.cumsum((target - target.mean()) ** 2)))
-    first = int(np.argmax(energy[n:] - energy[:-n]))
+    centred = target - target.mean()
+    sums, squares = (np.concatenate(([0.0], np.cumsum(column))) for column in (centred, centred**2))
+    variation = squares[n:] - squares[:-n] - (sums[n:] - sums[:-n]) ** 2 / n
+    first = int(np.argmax(variation))
     return first, first + n
 
 

@@ -106,7 +106,7 @@ def report_html(assessments: Sequence[Assessment]) -> str:
     title = (
         f"Tracking of {len(assessments)} pairs in {n_files} {'file' if n_files == 1 else 'files'}"
         if several
-        else f"Tracking in {assessments[0].file}"
+        else f"Tracking in {_source(assessments[0])}"
     )
     parts = [
         "<!DOCTYPE html>",
@@ -514,8 +514,13 @@ def _frequency_drawing(a: Assessment) -> dict[str, Any] | None:
 # ---------------------------------------------------------------------------------------------------- the page's parts
 
 
+def _source(a: Assessment) -> str:
+    """The file, or words for samples that did not come from one."""
+    return a.file or "samples given in Python"
+
+
 def _name(a: Assessment, several_files: bool = True) -> str:
-    parts = [Path(a.file).name] if several_files else []
+    parts = [Path(_source(a)).name] if several_files else []
     parts.append(f"actuator {a.actuator}")
     if a.part != "whole":
         parts.append(a.part)
@@ -551,7 +556,8 @@ def _summary(assessments: Sequence[Assessment]) -> str:
             _number("rms_error_percent", a.indices.rms_error_percent),
         )
         rows.append(
-            f'<tr data-assessment="{number}"><th scope="row"><a href="#assessment-{number}">{escape(a.file)}</a></th>'
+            f'<tr data-assessment="{number}">'
+            f'<th scope="row"><a href="#assessment-{number}">{escape(_source(a))}</a></th>'
             f"<td>{a.actuator}</td><td>{escape(a.part)}</td>"
             f'<td class="pair">{escape(a.target_name)} → {escape(a.measured_name)}</td>'
             + "".join(f'<td class="number">{text}</td>' for text in numbers)
@@ -598,7 +604,7 @@ def _heading(a: Assessment) -> str:
     target_role, measured_role = display.signal_roles(a.part)
     what = {"compensator": "compensator alone", "actuator": "actuator alone"}.get(a.part, "")
     facts = [
-        escape(a.file),
+        escape(_source(a)),
         f"actuator {a.actuator}" + (f", {what}" if what else ""),
         f"{escape(_signal(target_role, a.target_name))} → {escape(_signal(measured_role, a.measured_name))}",
         f"{_number('n_samples', int(a.target.size))} samples at {a.rate_hz:.6g} Hz",
@@ -768,7 +774,7 @@ def _frequency_charts(a: Assessment, drawing: Mapping[str, Any]) -> str:
 def _settings_table(a: Assessment, version: str, created: datetime) -> str:
     settings = {**dataclasses.asdict(a.tracking.settings), **a.settings}
     rows = [
-        ("file", "File", a.file),
+        ("file", "File", _source(a)),
         ("rate", "Rate", f"{a.rate_hz:.6g} Hz"),
         ("first_sample", "First sample at", f"{a.start_s:.6g} s"),
         ("duration", "Duration", f"{a.target.size / a.rate_hz:.6g} s"),

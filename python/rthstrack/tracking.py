@@ -127,14 +127,22 @@ def _number(name: str, value: Any) -> float:
 
 def _samples(name: str, samples: ArrayLike) -> NDArray[np.float64]:
     """C-contiguous float64 of one or two dimensions; no copy where it already is."""
-    if type(samples) is np.ndarray and samples.dtype == np.float64 and samples.flags.c_contiguous:
+    if (
+        type(samples) is np.ndarray
+        and samples.dtype == np.float64
+        and samples.flags.c_contiguous
+        and samples.flags.aligned
+    ):
         array = samples
     else:
-        # A masked sample is a missing one.
-        array = samples.filled(np.nan) if isinstance(samples, np.ma.MaskedArray) else np.asarray(samples)
+        try:
+            # A masked sample is a missing one.
+            array = samples.filled(np.nan) if isinstance(samples, np.ma.MaskedArray) else np.asarray(samples)
+        except (TypeError, ValueError) as error:
+            raise SignalError(f"{name} must be an array of numbers: {str(error).splitlines()[0]}") from None
         if array.dtype.kind not in "fiu":
             raise SignalError(f"{name} must hold real numbers, not {array.dtype}")
-        array = np.ascontiguousarray(array, dtype=np.float64)
+        array = np.require(array, np.float64, ["C", "A"])
     if array.ndim not in (1, 2):
         raise SignalError(f"{name} must have the shape (n_samples,) or (n_samples, n_actuators), not {array.shape}")
     return array
@@ -424,9 +432,12 @@ def _each_actuator(
     """Applies `call` to each column and stacks what it returns."""
     if target.ndim == 1:
         return call(target, measured)
-    found = [
-        call(np.ascontiguousarray(target[:, a]), np.ascontiguousarray(measured[:, a])) for a in range(target.shape[1])
-    ]
+    found = []
+    for a in range(target.shape[1]):
+        try:
+            found.append(call(np.ascontiguousarray(target[:, a]), np.ascontiguousarray(measured[:, a])))
+        except RthstrackError as error:
+            raise type(error)(f"actuator {a}: {error}") from None
     return tuple(np.stack(column, axis=1) for column in zip(*found, strict=True))
 
 

@@ -39,6 +39,8 @@ _DELAY_SPREAD = 0.2
 def sentence(tracking: Tracking, target: str = "target", measured: str = "measured") -> str:
     """The verdict, for example: measured lags target by 13.2 ms and is 1.8 % too large, judged at 0.9 Hz."""
     delay_s, amplitude = float(tracking.delay_s), float(tracking.amplitude)
+    if math.isnan(delay_s):
+        return f"{measured} does not move: it has no delay"
     milliseconds = f"{1e3 * abs(delay_s):.3g} ms"
     if float(f"{1e3 * abs(delay_s):.3g}") == 0:
         timing = f"{measured} is in time with {target}"
@@ -50,8 +52,13 @@ def sentence(tracking: Tracking, target: str = "target", measured: str = "measur
     elif amplitude > 2:
         size = f"is {amplitude:.3g} times too large"
     else:
-        size = f"is {abs(excess):.2g} % too {'large' if excess > 0 else 'small'}"
+        size = f"is {_percent(abs(excess))} % too {'large' if excess > 0 else 'small'}"
     return f"{timing} and {size}, judged at {float(tracking.equivalent_frequency_hz):.2g} Hz"
+
+
+def _percent(value: float) -> str:
+    """Two digits, and no power of ten: 0.12, 1.8, 44, 100."""
+    return f"{value:.0f}" if value >= 9.95 else f"{value:.2g}"
 
 
 def exceeded(tracking: Tracking, limits: Limits) -> tuple[str, ...]:

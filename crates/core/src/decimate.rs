@@ -26,7 +26,7 @@ use pulp::Simd;
 use crate::error::{Error, Result};
 
 /// Rejection of what would alias onto a kept bin, relative to the gain of that bin, in decibels.
-pub const ALIAS_DB: f64 = 180.0;
+pub const ALIAS_DB: f64 = 240.0;
 
 /// Halvings that share one pass: eight samples in, one out.
 const MAX_HALVINGS: usize = 3;

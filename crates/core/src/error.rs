@@ -60,7 +60,9 @@ pub enum Error {
     },
     /// Finite samples so large or so small that their powers leave the range of double precision.
     Range {
-        /// Largest magnitude of the target.
+        /// The signal.
+        signal: Signal,
+        /// Its largest magnitude.
         peak: f64,
         /// Weight power in force.
         weight_power: u32,
@@ -148,10 +150,10 @@ impl fmt::Display for Error {
                 f,
                 "target is constant ({value}): it must move for its tracking to be judged; is this the right channel?"
             ),
-            Error::Range { peak, weight_power } => write!(
+            Error::Range { signal, peak, weight_power } => write!(
                 f,
-                "target's magnitudes (peak {peak:e}) raised to the weight power {weight_power} leave the range of double \
-                 precision: rescale the channels or lower the weight power"
+                "{signal}'s magnitudes (peak {peak:e}), raised to the weight power {weight_power}, leave the range of double \
+                 precision: scale the channel to a usual unit or lower the weight power"
             ),
             Error::NoEnergy => {
                 write!(f, "target has no energy at the bins that are kept: widen the band or lower P and Q")

@@ -4,7 +4,7 @@ use num_complex::Complex;
 use rustfft::FftPlanner;
 
 use crate::error::{Error, Result, Signal};
-use crate::pair::{Pair, check_finite};
+use crate::pair::{Pair, check_finite, peak};
 
 /// One number each for the whole record. I is the target, O the measured displacement.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,9 +52,9 @@ pub struct IndexHistories {
 /// Lag makes TI positive.
 ///
 /// # Errors
-/// [`Error::NotFinite`]; [`Error::Length`] for a force of another length.
+/// [`Error::NotFinite`], [`Error::Range`]; [`Error::Length`] for a force of another length.
 pub fn index_histories(pair: &Pair<'_>, force: Option<&[f64]>) -> Result<IndexHistories> {
-    pair.check_finite()?;
+    pair.check_samples()?;
     let (target, measured) = (pair.target(), pair.measured());
     let n = target.len();
     if let Some(force) = force {
@@ -107,7 +107,7 @@ pub fn indices(pair: &Pair<'_>, force: Option<&[f64]>, max_lag_s: f64) -> Result
     let (target, measured) = (pair.target(), pair.measured());
     let last = |history: &[f64]| history[history.len() - 1];
     let errors: Vec<f64> = measured.iter().zip(target).map(|(m, t)| m - t).collect();
-    let peak = target.iter().fold(0.0f64, |p, v| p.max(v.abs()));
+    let peak = peak(target);
     let max_tracking_error = last(&histories.max_tracking_error);
     let rms_error = last(&histories.rms_error);
     let relative_peak = 100.0 * max_tracking_error / peak;
@@ -133,6 +133,9 @@ fn variance(values: &[f64]) -> f64 {
     let centre = mean(values.iter().copied());
     mean(values.iter().map(|v| (v - centre) * (v - centre)))
 }
+
+/// Share of the whole record's energy below which running sums cannot tell a stretch from a constant one.
+const ROUND_OFF_SHARE: f64 = 1e-12;
 
 /// Lag, in samples, of the highest Pearson correlation between measured[k:] and target[:N-k]; the smaller lag of equals.
 fn correlation_lag(target: &[f64], measured: &[f64], max_lag: f64) -> isize {
@@ -167,6 +170,7 @@ fn correlation_lag(target: &[f64], measured: &[f64], max_lag: f64) -> isize {
     };
     let (sums_x, sums_y) = (running(&x), running(&y));
     let stretch = |sums: &[(f64, f64)], from: usize, to: usize| (sums[to].0 - sums[from].0, sums[to].1 - sums[from].1);
+    let (round_off_x, round_off_y) = (ROUND_OFF_SHARE * sums_x[n].1, ROUND_OFF_SHARE * sums_y[n].1);
     let correlation = |lag: isize| -> f64 {
         let shift = lag.unsigned_abs();
         let overlap = (n - shift) as f64;
@@ -174,8 +178,12 @@ fn correlation_lag(target: &[f64], measured: &[f64], max_lag: f64) -> isize {
         let (sx, sxx) = stretch(&sums_x, from_x, from_x + n - shift);
         let (sy, syy) = stretch(&sums_y, from_y, from_y + n - shift);
         let sxy = cross[lag.rem_euclid(len as isize) as usize].re / len as f64;
-        let spread = (sxx - sx * sx / overlap) * (syy - sy * sy / overlap);
-        if spread > 0.0 { (sxy - sx * sy / overlap) / spread.sqrt() } else { f64::NEG_INFINITY }
+        let (spread_x, spread_y) = (sxx - sx * sx / overlap, syy - sy * sy / overlap);
+        // What is constant over the overlap correlates with nothing; the running sums leave only their round-off of it.
+        if spread_x <= round_off_x || spread_y <= round_off_y {
+            return f64::NEG_INFINITY;
+        }
+        (sxy - sx * sy / overlap) / (spread_x.sqrt() * spread_y.sqrt())
     };
     let mut best = (correlation(0), 0);
     for lag in (1..=most as isize).flat_map(|k| [k, -k]) {

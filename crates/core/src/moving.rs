@@ -45,10 +45,10 @@ pub struct MovingTracking {
 /// Each reading is that of [`Evaluator::evaluate`] on the window's samples alone.
 ///
 /// # Errors
-/// [`Error::Setting`] for a window longer than the record or a hop or ratio out of range; [`Error::NotFinite`]; whatever
+/// [`Error::Setting`] for a window longer than the record or a hop or ratio out of range; [`Error::NotFinite`], [`Error::Range`]; whatever
 /// [`Evaluator::new`] refuses for one window.
 pub fn evaluate_moving(pair: &Pair<'_>, config: &MovingConfig) -> Result<MovingTracking> {
-    pair.check_finite()?;
+    pair.check_samples()?;
     let (n, rate_hz) = (pair.n_samples(), pair.rate_hz());
     let window = samples_of("window_s", config.window_s, rate_hz, MIN_SAMPLES, n)?;
     let hop = samples_of("hop_s", config.hop_s, rate_hz, 1, usize::MAX)?;
@@ -64,7 +64,15 @@ pub fn evaluate_moving(pair: &Pair<'_>, config: &MovingConfig) -> Result<MovingT
     let starts = (0..n - window + 1).step_by(hop);
     let mut out = MovingTracking::with_capacity(starts.len());
     for start in starts {
-        let tracking = if variance.of(start, start + window) >= least { moving.at(start).ok() } else { None };
+        let tracking = if variance.of(start, start + window) < least {
+            None
+        } else {
+            match moving.at(start) {
+                Ok(tracking) => Some(tracking),
+                Err(Error::NoEnergy | Error::ConstantTarget { .. }) => None,
+                Err(error) => return Err(error),
+            }
+        };
         let number = |f: fn(&crate::Tracking) -> f64| tracking.as_ref().map_or(f64::NAN, f);
         out.time_s.push((start as f64 + (window - 1) as f64 / 2.0) / rate_hz);
         out.amplitude.push(number(|t| t.amplitude));

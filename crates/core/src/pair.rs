@@ -65,6 +65,29 @@ impl<'a> Pair<'a> {
         check_finite(self.target, Signal::Target)?;
         check_finite(self.measured, Signal::Measured)
     }
+
+    /// Looks at every sample, and whether squares of them stay well within double precision.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`], [`Error::Range`].
+    pub fn check_samples(&self) -> Result<()> {
+        self.check_finite()?;
+        for (signal, samples) in [(Signal::Target, self.target), (Signal::Measured, self.measured)] {
+            let peak = peak(samples);
+            if peak != 0.0 && !SQUARABLE.contains(&peak) {
+                return Err(Error::Range { signal, peak, weight_power: 2 });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Magnitudes whose squares, and sums and ratios of these, keep their precision.
+const SQUARABLE: std::ops::RangeInclusive<f64> = 1e-120..=1e120;
+
+/// max |x|
+pub(crate) fn peak(samples: &[f64]) -> f64 {
+    samples.iter().fold(0.0, |p: f64, v| p.max(v.abs()))
 }
 
 /// Refuses a rate that is not a positive finite number.

@@ -65,9 +65,9 @@ pub struct FrequencyResponse {
 ///
 /// # Errors
 /// [`Error::TooShort`], [`Error::Setting`] for a segment or overlap that leaves fewer than two segments,
-/// [`Error::NotFinite`].
+/// [`Error::NotFinite`], [`Error::Range`].
 pub fn frequency_response(pair: &Pair<'_>, config: &ResponseConfig) -> Result<FrequencyResponse> {
-    pair.check_finite()?;
+    pair.check_samples()?;
     let (n, rate_hz) = (pair.n_samples(), pair.rate_hz());
     if n < MIN_SEGMENT * MIN_SEGMENTS {
         return Err(Error::TooShort { expected: MIN_SEGMENT * MIN_SEGMENTS, found: n });

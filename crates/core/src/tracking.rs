@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use num_complex::Complex;
 
 use crate::decimate::{Chebyshev, Decimator, Stream};
-use crate::error::{Error, Result};
-use crate::pair::{Pair, check_rate};
+use crate::error::{Error, Result, Signal};
+use crate::pair::{Pair, check_rate, peak};
 use crate::spectrum::{Bins, LANES, Sink, Spectrum, SpectrumConfig, SpectrumState};
 use crate::window::{Detrend, Window};
 
@@ -70,7 +70,7 @@ pub struct Tracking {
     pub fei: Complex<f64>,
     /// A = |FEI| (Eq 11a); 1 is perfect.
     pub amplitude: f64,
-    /// phi = atan2(Im FEI, Re FEI), in radians (Eq 11b); negative on lag.
+    /// phi = atan2(Im FEI, Re FEI), in radians (Eq 11b); negative on lag. NaN where measured is zero throughout.
     pub phase_rad: f64,
     /// d = -phi / (2 pi f_eq), in seconds (Eq 10); positive when measured lags.
     pub delay_s: f64,
@@ -277,26 +277,34 @@ impl Evaluator {
     /// Eqs 10 and 11 from the sums.
     fn finish(&self, sums: Sums, pair: &Pair<'_>) -> Result<Tracking> {
         let Sums { cross, power, moment, energy } = sums;
-        let peak = || pair.target().iter().fold(0.0f64, |p, v| p.max(v.abs()));
-        if ![cross.re, cross.im, power, moment].iter().all(|v| v.is_finite()) {
+        let cross_size = cross.re.abs().max(cross.im.abs());
+        if ![cross_size, power, moment, energy].iter().all(|v| v.is_finite()) {
             // A transform carries one NaN into every bin; only then is it looked for.
             pair.check_finite()?;
-            return Err(Error::Range { peak: peak(), weight_power: self.config.weight_power });
         }
+        let power_in_range = SUMS.contains(&power) && SUMS.contains(&energy) && moment.is_finite();
         // Below this the kept bins hold only the round-off of the others.
         let round_off = self.spectrum.fft_len() as f64 * energy_at_least(pair.target()) * ROUND_OFF_SHARE;
-        if power < f64::MIN_POSITIVE / f64::EPSILON || energy <= round_off {
-            let peak = peak();
-            let vanishes = weight(peak * peak, self.config.weight_power) < f64::MIN_POSITIVE / f64::EPSILON;
-            return Err(if vanishes {
-                Error::Range { peak, weight_power: self.config.weight_power }
-            } else {
+        if !power_in_range || energy <= round_off {
+            let peak = peak(pair.target());
+            let largest = weight(peak * peak, self.config.weight_power.max(2));
+            let in_range = SUMS.contains(&largest) && SUMS.contains(&weight(peak * peak, self.config.weight_power));
+            return Err(if in_range && power <= 1.0 / f64::MIN_POSITIVE {
                 Error::NoEnergy
+            } else {
+                Error::Range { signal: Signal::Target, peak, weight_power: self.config.weight_power }
             });
         }
         let fei = cross / power;
+        if !(SUMS.contains(&cross_size) && SUMS.contains(&fei.norm())) {
+            let peak = peak(pair.measured());
+            if peak > 0.0 {
+                return Err(Error::Range { signal: Signal::Measured, peak, weight_power: self.config.weight_power });
+            }
+        }
         let equivalent_frequency_hz = moment / power * self.delta_f_hz();
-        let phase_rad = fei.im.atan2(fei.re);
+        // A sensor that reports nothing is not in time: it has no phase.
+        let phase_rad = if cross_size == 0.0 { f64::NAN } else { fei.im.atan2(fei.re) };
         Ok(Tracking {
             fei,
             amplitude: fei.norm(),
@@ -306,6 +314,9 @@ impl Evaluator {
         })
     }
 }
+
+/// Sums that lie well within double precision, with room for their smallest terms.
+const SUMS: std::ops::RangeInclusive<f64> = 1e-250..=1e280;
 
 /// Share of the energy that round-off alone leaves in any band: (100 eps)^2.
 const ROUND_OFF_SHARE: f64 = 5e-28;

@@ -10,6 +10,15 @@ static SETTING_ERROR: PyOnceLock<Py<PyType>> = PyOnceLock::new();
 
 /// `SignalError` for what is wrong with the samples, `SettingError` for what is wrong with the settings.
 pub(crate) fn to_py(py: Python<'_>, error: &Error) -> PyErr {
+    with_message(py, error, error.to_string())
+}
+
+/// The same for one of several actuators, which the message names.
+pub(crate) fn of_actuator(py: Python<'_>, actuator: usize, error: &Error) -> PyErr {
+    with_message(py, error, format!("actuator {actuator}: {error}"))
+}
+
+fn with_message(py: Python<'_>, error: &Error, message: String) -> PyErr {
     let class = match error {
         Error::Length { .. }
         | Error::TooShort { .. }
@@ -20,7 +29,7 @@ pub(crate) fn to_py(py: Python<'_>, error: &Error) -> PyErr {
         | Error::TooShortForChebyshev { .. } => SIGNAL_ERROR.import(py, "rthstrack.errors", "SignalError"),
         _ => setting_class(py),
     };
-    class.map_or_else(|e| e, |class| PyErr::from_type(class.clone(), error.to_string()))
+    class.map_or_else(|e| e, |class| PyErr::from_type(class.clone(), message))
 }
 
 /// A `SettingError` for a name that is not one of the choices.

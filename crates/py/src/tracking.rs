@@ -7,7 +7,7 @@ use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 use rthstrack::{Decimator, Detrend, Estimator, EvaluatorConfig, EvaluatorState, Pair, Spectra, Tracking, Window};
 
-use crate::error::{choice, to_py};
+use crate::error::{choice, of_actuator, to_py};
 use crate::signal::Columns;
 
 /// amplitude, phase_rad, delay_s, equivalent_frequency_hz, fei
@@ -143,13 +143,18 @@ impl Evaluator {
         let (target, measured) = (Columns::new(target)?, Columns::new(measured)?);
         let results = py.detach(|| {
             let mut state = self.lock().pop().unwrap_or_else(|| self.plan.state());
-            let results: rthstrack::Result<Vec<T>> = (0..target.len())
-                .map(|a| call(&mut state, &Pair::new(target.at(a), measured.at(a), self.plan.rate_hz())?))
-                .collect();
+            let judge = |state: &mut EvaluatorState, a: usize| {
+                call(state, &Pair::new(target.at(a), measured.at(a), self.plan.rate_hz())?)
+            };
+            let results: Result<Vec<T>, _> =
+                (0..target.len()).map(|a| judge(&mut state, a).map_err(|e| (a, e))).collect();
             self.lock().push(state);
             results
         });
-        results.map_err(|e| to_py(py, &e))
+        results.map_err(|(actuator, error)| match target {
+            Columns::One(_) => to_py(py, &error),
+            Columns::Many(_) => of_actuator(py, actuator, &error),
+        })
     }
 
     /// A state holds nothing between calls, so one left by a panic is as good as new.

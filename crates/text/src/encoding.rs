@@ -55,7 +55,7 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<(Cow<'_, [u8]>, Encoding), TextErro
     }
     let head = &ascii[..ascii.len().min(HEAD)];
     let strange = |b: &u8| *b < 0x20 && !matches!(b, b'\t' | b'\n' | b'\r' | 0x0c | 0x1a);
-    if let Some(at) = head.iter().position(|b| strange(b)) {
+    if let Some(at) = head.iter().position(strange) {
         return Err(TextError::Binary { offset: at + offset, byte: head[at] });
     }
     Ok((ascii, encoding))

@@ -77,7 +77,7 @@ pub(crate) fn field_end(bytes: &[u8], at: usize, delimiter: Delimiter) -> usize 
 }
 
 /// The fields of one line, blanks around them taken off and quotes kept.
-pub(crate) fn fields<'a>(line: &'a [u8], delimiter: Delimiter) -> Vec<&'a [u8]> {
+pub(crate) fn fields(line: &[u8], delimiter: Delimiter) -> Vec<&[u8]> {
     let mut found = Vec::new();
     each_field(line, delimiter, |field| found.push(field));
     found

@@ -52,8 +52,8 @@ def examine(stamps: NDArray[np.float64], unit_s: float = 1.0) -> Uniform | Irreg
     steps among equal ones are a lost or repeated sample, not rounding: that would come back at an even spacing.)
 
     The rate is the inverse slope of the least-squares line, replaced by the first of these that lies within what the
-    stamps allow, if they leave less than 0.1 % open: one or two significant digits; a power of two; a step of one or
-    two significant digits; three to six significant digits.
+    stamps allow, if they leave less than 0.1 % open: one significant digit; a power of two; two significant digits; a
+    step of one or two significant digits; three to six significant digits.
     """
     with np.errstate(all="ignore"):
         return _examine(stamps, unit_s)
@@ -146,8 +146,7 @@ def _nice(rate: float, low: float, high: float) -> float:
     if not high - low < 2 * _NICE * rate:
         low = high = rate
     low, high = min(low, rate * (1 - _ROUND_OFF)), max(high, rate * (1 + _ROUND_OFF))
-    candidates = [float(f"{rate:.{digits}e}") for digits in range(2)]
-    candidates.append(2.0 ** round(math.log2(rate)))
+    candidates = [float(f"{rate:.0e}"), 2.0 ** round(math.log2(rate)), float(f"{rate:.1e}")]
     candidates += [1 / float(f"{1 / rate:.{digits}e}") for digits in range(2)]
     candidates += [float(f"{rate:.{digits}e}") for digits in range(2, 6)]
     return next((c for c in candidates if low <= c <= high), rate)
