@@ -64,7 +64,7 @@ def test_matlab_vectors_and_matrices_are_channels_in_matlabs_words(tmp_path: Pat
 
 def test_nested_structs_struct_arrays_and_cells_are_walked(tmp_path: Path) -> None:
     data = np.empty((1, 2), dtype=[("values", "O"), ("label", "O"), ("unit", "O"), ("raw", "O")])
-    data[0, 0] = (np.column_stack([TARGET, MEASURED]), "both", "mm", 0)
+    data[0, 0] = (np.column_stack([TARGET, MEASURED]), "both", "mm", "")
     data[0, 1] = (TARGET, "target disp", "mm", MEASURED)
     cell = np.empty((1, 2), dtype=object)
     cell[0, 0], cell[0, 1] = TARGET, "text"

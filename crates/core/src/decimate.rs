@@ -26,7 +26,7 @@ use pulp::Simd;
 use crate::error::{Error, Result};
 
 /// Rejection of what would alias onto a kept bin, relative to the gain of that bin, in decibels.
-pub const ALIAS_DB: f64 = 240.0;
+pub const ALIAS_DB: f64 = 220.0;
 
 /// Halvings that share one pass: eight samples in, one out.
 const MAX_HALVINGS: usize = 3;
@@ -38,6 +38,8 @@ const IN_FLIGHT: usize = 8;
 const MAX_BLOCK: usize = IN_FLIGHT * LANES;
 /// Below this many points a transform is cheaper than another pass.
 const SHORTEST: usize = 512;
+/// A lone halving saves no more than half a transform: below this many points it costs as much itself.
+const SHORTEST_ALONE: usize = 8192;
 
 /// How P is carried out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -296,6 +298,9 @@ impl Cascade {
         // One octave of guard: the last halving sees f_c at an eighth of its input rate.
         while (4 << halvings.len()) <= data_decimation && (n >> (halvings.len() + 1)) >= SHORTEST {
             halvings.push(Halving::new((1 << halvings.len()) as f64 / (2.0 * data_decimation as f64)));
+        }
+        if halvings.len() == 1 && n < SHORTEST_ALONE {
+            halvings.clear();
         }
         // Full passes last would leave a short first pass over the longest data; so they come first.
         let passes = halvings.chunks(MAX_HALVINGS).map(Pass::new).collect();

@@ -16,7 +16,7 @@ _JITTER = 0.01
 # Stamps may be this many quanta beside the exact time: half of one is rounding, the rest is round-off.
 _ROUNDING = 0.51
 # A rate is rounded to a nice value only where the stamps leave less than this open.
-_NICE = 1e-3
+_NICE = 5e-4
 # Even exact stamps are known to round-off only.
 _ROUND_OFF = 1e-9
 
@@ -52,8 +52,8 @@ def examine(stamps: NDArray[np.float64], unit_s: float = 1.0) -> Uniform | Irreg
     steps among equal ones are a lost or repeated sample, not rounding: that would come back at an even spacing.)
 
     The rate is the inverse slope of the least-squares line, replaced by the first of these that lies within what the
-    stamps allow, if they leave less than 0.1 % open: one significant digit; a power of two; two significant digits; a
-    step of one or two significant digits; three to six significant digits.
+    stamps allow, if they leave less than 0.05 % open: one or two significant digits; a step of one or two significant
+    digits; three to six significant digits.
     """
     with np.errstate(all="ignore"):
         return _examine(stamps, unit_s)
@@ -146,7 +146,7 @@ def _nice(rate: float, low: float, high: float) -> float:
     if not high - low < 2 * _NICE * rate:
         low = high = rate
     low, high = min(low, rate * (1 - _ROUND_OFF)), max(high, rate * (1 + _ROUND_OFF))
-    candidates = [float(f"{rate:.0e}"), 2.0 ** round(math.log2(rate)), float(f"{rate:.1e}")]
+    candidates = [float(f"{rate:.{digits}e}") for digits in range(2)]
     candidates += [1 / float(f"{1 / rate:.{digits}e}") for digits in range(2)]
     candidates += [float(f"{rate:.{digits}e}") for digits in range(2, 6)]
     return next((c for c in candidates if low <= c <= high), rate)
