@@ -142,7 +142,7 @@ def main() -> int:
         "",
         f"`make bench`, {date.today().isoformat()}: {machine()}. One core; medians of {TURNS} turns in which the core,"
         " the transforms, the memory reads and SciPy are measured side by side. Times in microseconds; planning is left"
-        " out. `two real transforms` is `realfft` on its own; `reading once` is a fused sum of products over both arrays.",
+        " out. `two real transforms` is `realfft` alone; `reading once` is a fused sum of products over both arrays.",
         "",
     ]
     figures: list[tuple[str, str, str, bool]] = []

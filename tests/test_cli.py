@@ -187,10 +187,10 @@ def test_outputs_are_written_where_asked(capsys: pytest.CaptureFixture[str], rec
     assert status == 0
     assert (out / "r.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
     assert b"<svg" in (out / "f.svg").read_bytes()
-    rows = list(csv.DictReader((out / "r.csv").open(encoding="utf-8")))
+    rows = list(csv.DictReader((out / "r.csv").read_text(encoding="utf-8").splitlines()))
     assert float(rows[0]["delay_s"]) == pytest.approx(0.02, rel=1e-4)
     assert rows[0]["indices.j1_s"] == "0.02"
-    readings = list(csv.DictReader((out / "r_moving.csv").open(encoding="utf-8")))
+    readings = list(csv.DictReader((out / "r_moving.csv").read_text(encoding="utf-8").splitlines()))
     assert len(readings) == 19
     assert {r["valid"] for r in readings} == {"True", "False"}
     assert err.count("written to") == 4

@@ -5,7 +5,15 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Evaluator", "__version__", "evaluate_moving", "frequency_response", "index_histories", "indices", "read_text"]
+__all__ = [
+    "Evaluator",
+    "__version__",
+    "evaluate_moving",
+    "frequency_response",
+    "index_histories",
+    "indices",
+    "read_text",
+]
 
 _Numbers = tuple[float, float, float, float, complex]
 _Array = NDArray[np.float64]

@@ -91,7 +91,7 @@ def assess(
 ) -> Assessment:
     """Judges one pair in every way there is: whole record, moving windows, over frequency, indices, warnings.
 
-    target, measured: (n_samples,) in `unit` (and `measured_unit`, the same unless given); settings: those of `evaluate`.
+    target, measured: (n_samples,) in `unit` (and `measured_unit`, the same unless given); settings: of `evaluate`.
     moving_s, hop_s: moving windows; by default 4 s but at most a quarter of the record, sixteen readings a window.
     limits: apply to |delay| and |amplitude - 1|. `origin` says what was done to the samples before.
 

@@ -369,8 +369,8 @@ def evaluate(
     over the bins k = Q, 2Q, ... <= p/P of the transform zero-padded to n = 2^ceil(log2 L) = 2p points.
 
     target, measured: (n_samples,) or (n_samples, n_actuators), any one unit; rate_hz: samples a second.
-    data_decimation: P, a power of two: keeps frequencies up to rate/(2P); decimator "spectral" keeps exactly the bins of
-    the undecimated transform, "chebyshev" filters and resamples as the paper did.
+    data_decimation: P, a power of two: keeps frequencies up to rate/(2P); decimator "spectral" keeps exactly the
+    bins of the undecimated transform, "chebyshev" filters and resamples as the paper did.
     frequency_decimation: Q, a power of two: keeps every Q-th bin.
     weight_power: l, 1 to 16. window: boxcar, hann, hamming, blackman, flattop or tukey (alpha 0.5).
     detrend: none, mean or linear. band_hz: lowest and highest frequency kept, both included.
@@ -409,7 +409,7 @@ def _tracking(
     measured: NDArray[np.float64],
     weights: bool,
 ) -> Tracking:
-    spectra: tuple[Any, ...] = ()
+    spectra: tuple[Any, ...] = (None, None, None, None)
     if weights:
         found = plan.evaluate_with_spectra(target, measured)
         numbers = [n for n, _ in found]
@@ -421,7 +421,20 @@ def _tracking(
     else:
         numbers = plan.evaluate(target, measured)
     values: Sequence[Any] = numbers[0] if target.ndim == 1 else [np.array(v) for v in zip(*numbers, strict=True)]
-    return Tracking(*values, plan.n_bins, plan.delta_f_hz, rate_hz, len(target), settings, *spectra)
+    amplitude, phase_rad, delay_s, equivalent_frequency_hz, fei = values
+    return Tracking(
+        amplitude,
+        phase_rad,
+        delay_s,
+        equivalent_frequency_hz,
+        fei,
+        plan.n_bins,
+        plan.delta_f_hz,
+        rate_hz,
+        len(target),
+        settings,
+        *spectra,
+    )
 
 
 def _each_actuator(
@@ -460,8 +473,8 @@ def evaluate_moving(
 ) -> MovingTracking:
     """A(t), d(t) and f_eq(t): `evaluate` on windows of window_s, one every hop_s.
 
-    Windows of W = round(window_s rate) samples start at 0, H, 2H, ... with H = round(hop_s rate); each reading is that of
-    `evaluate` on the window's samples alone, and speaks for the window's centre (start + (W-1)/2) / rate.
+    Windows of W = round(window_s rate) samples start at 0, H, 2H, ... with H = round(hop_s rate); each reading is
+    that of `evaluate` on the window's samples alone, and speaks for the window's centre (start + (W-1)/2) / rate.
     Where the target's standard deviation in the window is below minimum_std_ratio times that of the whole record, or
     nothing is left to judge by, `valid` is False and the numbers are NaN.
 
@@ -480,13 +493,14 @@ def evaluate_moving(
     )._checked()
     rate_hz, window_s, hop_s = _number("rate_hz", rate_hz), _number("window_s", window_s), _number("hop_s", hop_s)
     ratio = _number("minimum_std_ratio", minimum_std_ratio)
-    time_s, *arrays = _each_actuator(
+    time_s, amplitude, phase_rad, delay_s, frequency_hz, valid = _each_actuator(
         t,
         m,
         lambda x, y: _core.evaluate_moving(x, y, rate_hz, window_s, hop_s, ratio, *settings._arguments()),
     )
+    time_s = time_s if time_s.ndim == 1 else time_s[:, 0]
     return MovingTracking(
-        time_s if time_s.ndim == 1 else time_s[:, 0], *arrays, window_s, hop_s, ratio, rate_hz, settings
+        time_s, amplitude, phase_rad, delay_s, frequency_hz, valid, window_s, hop_s, ratio, rate_hz, settings
     )
 
 

@@ -18,7 +18,7 @@ MISUSE = 2
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs the command line and returns the exit status: 0 done, 1 some file failed, 2 misuse, 3 a limit was exceeded."""
+    """Runs the command line; returns the exit status: 0 done, 1 some file failed, 2 misuse, 3 a limit was exceeded."""
     parser = argparse.ArgumentParser(
         prog="rthstrack",
         description="Did the actuator do what the simulation asked? Gain and delay of actuator tracking.",
