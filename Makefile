@@ -138,5 +138,5 @@ toolchain:
 
 .venv/built: .venv/ready $(RUST_SOURCES) | toolchain
 	$(call say,building rthstrack._core)
-	@VIRTUAL_ENV="$(CURDIR)/.venv" $(BIN)/maturin develop --release --locked --quiet
+	@PIP_QUIET=1 VIRTUAL_ENV="$(CURDIR)/.venv" $(BIN)/maturin develop --release --locked --quiet
 	@touch $@

@@ -100,3 +100,8 @@ def test_limits_are_told_only_where_exceeded() -> None:
     assert told() == told(delay_s=0.0101, amplitude=0.101) == ()
     assert len(told(delay_s=0.0099)) == len(told(amplitude=0.099)) == 1
     assert len(told(delay_s=0.001, amplitude=0.001)) == 2
+
+
+def test_a_quantised_peak_is_not_taken_for_clipping() -> None:
+    slow = np.round(response(0.01, f_hz=0.3) / 0.01) * 0.01
+    assert "clipped" not in warned(response(f_hz=0.3), slow)

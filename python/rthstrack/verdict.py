@@ -30,7 +30,8 @@ _OFFSET_STD = 0.25
 _HIGH_SHARE, _HIGH_FACTOR = 0.02, 8.0
 _LOW_COHERENCE = 0.9
 _FEW_LEVELS = 64
-_CLIPPED_RUN, _CLIPPED_STD, _CLIPPED_STEPS = 5, 1.5, 3
+# Clipped: so many samples in a row at an extreme so far from the mean, reached at a good part of the highest speed.
+_CLIPPED_RUN, _CLIPPED_STD, _CLIPPED_SPEED = 5, 1.5, 0.2
 _ODD_AMPLITUDE = 3.0
 # Spread of the delay over the frequencies that carry the weight, as a share of the delay.
 _DELAY_SPREAD = 0.2
@@ -213,12 +214,12 @@ def _delay_spread(tracking: Tracking, response: FrequencyResponse | None) -> str
 
 
 def _clipped(signal: NDArray[np.float64], name: str) -> str | None:
-    """A signal that runs into its extreme at speed and stays there; a quantised peak comes in by single steps."""
+    """A signal that runs into its extreme at speed and stays there; a quantised peak is reached slowly."""
     mean, spread = float(signal.mean()), float(signal.std())
     steps = np.abs(np.diff(signal))
     if not steps.any():
         return None
-    fast = _CLIPPED_STEPS * float(steps[steps > 0].min())
+    fast = _CLIPPED_SPEED * float(steps.max())
     for extreme in (float(signal.max()), float(signal.min())):
         if abs(extreme - mean) < _CLIPPED_STD * spread:
             continue

@@ -447,6 +447,9 @@ def _print_table_of_all(console: Console, assessments: Sequence[Assessment]) -> 
             Text(remarks.strip(), style="bold red" if a.exceeded else "yellow"),
         )
     console.print(table)
+    for a in assessments:
+        for text in (*a.exceeded, *a.warnings):
+            console.print(Text(f"{a.file}: ", style="yellow") + Text(text))
 
 
 def _json_safe(value: Any) -> Any:
