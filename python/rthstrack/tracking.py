@@ -114,7 +114,7 @@ def _count(name: str, value: Any) -> int:
     except TypeError:
         raise SettingError(f"{name} must be a whole number, not {value!r}") from None
     if not 0 < number < 2**32:
-        raise SettingError(f"{name} must be a whole number from 1 on, not {number}")
+        raise SettingError(f"{name} must be a whole number from 1 to 2**32 - 1, not {number}")
     return number
 
 

@@ -1,6 +1,6 @@
 //! Data decimation P, in two forms.
 //!
-//! [`Cascade`] serves the `spectral` decimator: it shortens the (circular) record so that a short transform gives the bins
+//! `Cascade` serves the `spectral` decimator: it shortens the (circular) record so that a short transform gives the bins
 //! that P keeps. [`Chebyshev`] is the paper's own route, in second-order sections.
 //!
 //! # The cascade

@@ -93,7 +93,7 @@ pub fn index_histories(pair: &Pair<'_>, force: Option<&[f64]>) -> Result<IndexHi
 
 /// The indices of the whole record; J1 is searched within +-`max_lag_s` (and half the record).
 ///
-/// J1 = dt argmax_k corr(O[k:], I[:N-k]) with Pearson's correlation over the overlap; the RTHS benchmark searches k = 0 .. 49
+/// J1 = dt argmax_k corr(O_k.., I_..N-k) with Pearson's correlation over the overlap; the RTHS benchmark searches k = 0 .. 49
 /// only, here leads are found too.
 ///
 /// # Errors

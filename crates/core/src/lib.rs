@@ -12,7 +12,7 @@
 //! 5. [`tracking`]: Eqs 6-12, amplitude and delay; [`Evaluator`] is the plan, [`EvaluatorState`] its buffers.
 //! 6. [`moving`]: the same over moving windows.
 //! 7. [`response`]: gain, phase, delay and coherence over frequency.
-//! 8. [`indices`]: the time-domain indices in use beside them.
+//! 8. [`mod@indices`]: the time-domain indices in use beside them.
 //!
 //! Signs: a positive delay means that measured lags target; amplitude 1 is perfect. Units are SI.
 
