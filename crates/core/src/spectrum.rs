@@ -431,10 +431,8 @@ impl Unpack {
             }
         }
         // What the groups leave: the middle bins and the Nyquist bin (k = H).
-        for k in (grouped + 1).max(first)..=(half - grouped).min(last + 1).saturating_sub(1) {
-            if k < half - grouped && k != half {
-                self.single(target, measured, k, sink);
-            }
+        for k in first.max(grouped + 1)..(half - grouped).min(last + 1) {
+            self.single(target, measured, k, sink);
         }
         if kept(half) {
             self.single(target, measured, half, sink);
