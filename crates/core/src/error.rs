@@ -176,7 +176,7 @@ impl fmt::Display for Error {
                     }
                     write!(f, "; widen the band or lower P or Q")
                 } else {
-                    write!(f, "keep nothing; P times Q must be at most {}", fft_len / 2)
+                    write!(f, "keep nothing; lower P or Q")
                 }
             }
             Error::Band { low_hz, high_hz } => {

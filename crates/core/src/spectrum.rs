@@ -87,7 +87,7 @@ impl Spectrum {
             while first <= last && (first as f64) * delta_f < low {
                 first += 1;
             }
-            last = last.min((high / delta_f).ceil() as usize + 1);
+            last = last.min(((high / delta_f).ceil() as usize).saturating_add(1));
             while last >= first && (last as f64) * delta_f > high {
                 last -= 1;
             }

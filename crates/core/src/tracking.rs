@@ -158,6 +158,14 @@ impl Evaluator {
             window: config.window,
             detrend: config.detrend,
             band_hz: config.band_hz,
+        })
+        .map_err(|error| match error {
+            // The filtered record has lost P by now; its message must not.
+            Error::NoBin { fft_len, frequency_decimation, available_hz, band_hz, .. } => {
+                let data_decimation = config.data_decimation;
+                Error::NoBin { fft_len, data_decimation, frequency_decimation, available_hz, band_hz }
+            }
+            other => other,
         })?;
         let droop = spectrum.droop();
         Ok(Self { config, n_samples, rate_hz, chebyshev, spectrum, droop })

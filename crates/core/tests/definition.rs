@@ -131,6 +131,7 @@ fn a_band_includes_both_its_ends() {
         check(300, config);
     }
     check(300, EvaluatorConfig { band_hz: Some((0.0, 1e9)), ..Default::default() });
+    check(300, EvaluatorConfig { band_hz: Some((0.0, f64::MAX)), ..Default::default() });
     check(300, EvaluatorConfig { band_hz: Some((1.0, 7.7)), frequency_decimation: 4, ..Default::default() });
 }
 
@@ -241,6 +242,11 @@ fn what_cannot_be_judged_is_an_error_that_names_it() {
         (EvaluatorConfig { data_decimation: 64, frequency_decimation: 64, ..config }, "no frequency bin is left"),
         (EvaluatorConfig { band_hz: Some((3.0, 1.0)), ..config }, "band_hz must be"),
         (EvaluatorConfig { band_hz: Some((0.01, 0.02)), ..config }, "no frequency bin is left"),
+        (EvaluatorConfig { band_hz: Some((1e300, f64::MAX)), ..config }, "no frequency bin is left"),
+        (
+            EvaluatorConfig { decimator: Decimator::Chebyshev, data_decimation: 512, ..config },
+            "no frequency bin is left: P = 512",
+        ),
         (EvaluatorConfig { weight_power: 0, ..config }, "weight_power must be"),
         (
             EvaluatorConfig { decimator: Decimator::Chebyshev, data_decimation: 3, ..config },
