@@ -338,7 +338,8 @@ fn energy_at_least(samples: &[f64]) -> f64 {
 /// d = -phi / (2 pi f), in seconds (Eq 10): a negative phase is a lag, a positive delay.
 #[inline]
 pub fn delay(phase_rad: f64, frequency_hz: f64) -> f64 {
-    -phase_rad / (2.0 * PI * frequency_hz)
+    // Not -phase_rad, which would make a perfect 0 a -0.
+    (0.0 - phase_rad) / (2.0 * PI * frequency_hz)
 }
 
 /// |I|^l from |I|^2.
