@@ -106,6 +106,14 @@ def test_values_that_are_read_cannot_be_changed(tmp_path: Path) -> None:
         ("Time step = 20 ms", 50.0, "header 'Time step'"),
         ("NPTS=   2495, DT=   .0100 SEC", 100.0, "header 'DT'"),
         ("Abtastrate: 600 Hz", 600.0, "header 'Abtastrate'"),
+        ("Sampling Rate,1,kHz", 1000.0, "header 'Sampling Rate'"),
+        ("Sample interval;5;ms", 200.0, "header 'Sample interval'"),
+        ("Sample rate: 1000 samples per second", 1000.0, "header 'Sample rate'"),
+        ("Sample rate\t1000\t1000", 1000.0, "header 'Sample rate'"),
+        ("Samples: 5 Sampling Rate: 1000 Channels: 3", 1000.0, "header 'Sampling Rate'"),
+        ("Sample Time: 10:25:03", None, None),
+        ("Sampling Time: 60 s", None, None),
+        ("Time step: 05/25/2022", None, None),
         ("Rate of loading: 10 mm/s", None, None),
         ("Test frequency: 5 Hz", None, None),
         ("Data rate: 10 Mbit", None, None),
@@ -162,6 +170,7 @@ def test_the_rate_given_goes_before_everything_and_contradictions_are_noted(tmp_
         "header 'Sampling Rate' says 50 Hz, but --rate was followed",
         "time column 't_s' says 100 Hz, but --rate was followed",
     )
+    assert read_recording(path, rate_hz=25, time="t_s").rate_hz == 25.0
 
 
 def test_a_header_and_a_time_column_that_contradict_each_other_are_an_error(tmp_path: Path) -> None:
@@ -418,6 +427,8 @@ def test_scaling_multiplies_and_makes_the_unit_unknown() -> None:
         "channel 'group/x' scaled by 10 (was in cm)",
         "channel 'group/y' scaled by -1 (was in mm)",
     )
+    with pytest.raises(SettingError, match="scale: '#0' names channel 'group/x', which is scaled already"):
+        recording.scaled({"x": 2, "#0": 2})
     for factor in (0, math.nan, math.inf):
         with pytest.raises(SettingError, match="scale of 'x': expected a finite number other than zero"):
             recording.scaled({"x": factor})

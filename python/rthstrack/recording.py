@@ -80,8 +80,10 @@ class Recording:
         for selector, factor in factors.items():
             if not (math.isfinite(factor) and factor != 0):
                 raise SettingError(f"scale of '{selector}': expected a finite number other than zero, found {factor}")
-            at = channels.index(self.channel(selector))
-            old = channels[at]
+            old = self.channel(selector)
+            at = self.channels.index(old)
+            if channels[at] is not old:
+                raise SettingError(f"scale: '{selector}' names channel '{old.path}', which is scaled already")
             unit = old.unit if abs(factor) == 1 else None
             channels[at] = replace(old, unit=unit, values=_frozen(old.values * factor))
             notes.append(f"channel '{old.path}' scaled by {factor:g}" + (f" (was in {old.unit})" if old.unit else ""))
@@ -160,8 +162,6 @@ def read_recording(
         raise SettingError(
             "rate and resample exclude each other: one ignores the time stamps, the other interpolates them"
         )
-    if rate_hz is not None and time is not None:
-        raise SettingError("rate and time exclude each other: both say what the sampling rate is")
     return recording_from(read_contents(path), file, rate_hz=rate_hz, time=time, resample_hz=resample_hz)
 
 

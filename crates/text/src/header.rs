@@ -2,6 +2,7 @@
 
 use crate::dialect::{Dialect, Kind};
 use crate::line::{fields, is_blank, uncommented, unquoted};
+use crate::table::column_name;
 use crate::{Delimiter, TextError, encoding, error};
 
 /// A line above the numbers.
@@ -29,9 +30,6 @@ const REACH: usize = 5;
 /// # Errors
 /// A line just above the first row that is a broken row, or a row of too few names.
 pub(crate) fn read(head: &[HeadLine<'_>], data: &HeadLine<'_>, dialect: &Dialect) -> Result<Header, TextError> {
-    // LVM: the names stand below the last of these marks.
-    let mark = head.iter().rposition(|line| line.bytes.trim_ascii().starts_with(b"***End_of_Header***"));
-    let head = &head[mark.map_or(0, |at| at + 1)..];
     let mut rows: Vec<Row> = Vec::new();
     let mut skipped = 0;
     for (at, line) in head.iter().enumerate().rev() {
@@ -98,10 +96,8 @@ fn refuse_broken_row(row: &Row, rows: &[Row], dialect: &Dialect) -> Result<(), T
     let (line, cells) = (row.number, &row.cells);
     let n_required = dialect.n_required();
     let names_above = rows.iter().find(|above| above.number < line);
-    let column = |at: usize| match names_above.and_then(|row| row.texts().get(at).cloned()).filter(|n| !n.is_empty()) {
-        Some(name) => name,
-        None => format!("column {at}"),
-    };
+    let names = names_above.map(Row::texts).unwrap_or_default();
+    let column = |at: usize| column_name(&names, at);
     let n_numbers = cells.iter().filter(|c| dialect.kind(c) == Kind::Number).count();
     if cells.len() < n_required {
         let only_numbers = n_numbers == cells.len() && n_numbers > 0;

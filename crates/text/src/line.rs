@@ -143,6 +143,7 @@ mod tests {
     #[test]
     fn a_delimiter_within_quotes_does_not_divide() {
         assert_eq!(fields(br#" "a, b" , c,"#, Delimiter::Comma), [&br#""a, b""#[..], b"c", b""]);
+        assert_eq!(fields(br#""a ""b, c"" d", 1"#, Delimiter::Comma), [&br#""a ""b, c"" d""#[..], b"1"]);
         assert_eq!(fields(br#"5" stroke, 1"#, Delimiter::Comma), [&br#"5" stroke"#[..], b"1"]);
         assert_eq!(fields(br#""never closed, 1"#, Delimiter::Comma), [&br#""never closed"#[..], b"1"]);
         assert_eq!(fields(b"  1\t 2  3 ", Delimiter::Blanks), [b"1", b"2", b"3"]);

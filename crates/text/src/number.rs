@@ -161,6 +161,15 @@ mod tests {
     }
 
     #[test]
+    fn digits_beyond_64_bits_do_not_wrap_around() {
+        // 2^64 + 1, 2^64 / 10 and their like.
+        for token in ["18446744073709551617", "1844674407370955.1617", "9007199254740993", "0.18446744073709551617e20"]
+        {
+            assert_eq!(parse(token.as_bytes(), b'.'), token.parse().ok(), "{token}");
+        }
+    }
+
+    #[test]
     fn a_fortran_exponent_is_an_exponent() {
         assert_eq!(parse(b"1.5D+03", b'.'), Some(1500.0));
         assert_eq!(parse(b"-2d-1", b'.'), Some(-0.2));

@@ -279,6 +279,7 @@ mod tests {
         assert_eq!(seconds("00:00:01.5"), 1.5);
         assert_eq!(seconds("12:30"), 45000.0);
         assert_eq!(seconds("12:00:00 AM"), 0.0);
+        assert_eq!(seconds("12:30:00 pm"), 45000.0);
         assert_eq!(seconds("01:02.25"), 62.25);
         assert_eq!(seconds("17:46:08:066"), 63968.066);
     }

@@ -371,9 +371,9 @@ fn is_remark(line: &[u8], delimiter: Delimiter, n_required: usize) -> bool {
     line.trim_ascii_start().starts_with(b"\"") && n_required > 1 && fields(line, delimiter).len() == 1
 }
 
-fn column_name(names: &[String], column: usize) -> String {
+pub(crate) fn column_name(names: &[String], column: usize) -> String {
     match names.get(column) {
-        Some(name) if !name.is_empty() => name.clone(),
+        Some(name) if !name.is_empty() => error::short(name),
         _ => format!("column {column}"),
     }
 }
