@@ -577,3 +577,19 @@ def test_channels_of_different_lengths_are_read(tmp_path: Path) -> None:
     recording = read_recording(tmp_path / "file.npz")
     assert [len(c.values) for c in recording.channels] == [100, 50]
     assert recording.rate_hz is None
+
+
+def test_files_read_by_several_threads_leave_the_warning_filters_alone(tmp_path: Path) -> None:
+    import warnings
+    from concurrent.futures import ThreadPoolExecutor
+
+    paths = []
+    for i in range(40):
+        path = tmp_path / f"{i}.npz"
+        np.savez(path, target=np.arange(10.0), measured=np.arange(10.0), rate_hz=100.0)
+        paths.append(path)
+    before = list(warnings.filters)
+    with ThreadPoolExecutor(8) as pool:
+        recordings = list(pool.map(read_recording, paths))
+    assert warnings.filters == before
+    assert all(r.rate_hz == 100 for r in recordings)

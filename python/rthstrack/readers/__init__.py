@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import struct
+import threading
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -27,6 +28,7 @@ _ENDINGS = {
     "NumPy npy": (".npy",),
     "NumPy npz": (".npz",),
 }
+_RECORDING_WARNINGS = threading.Lock()
 _OTHERS = (
     (b"\xd0\xcf\x11\xe0", "an old Excel or Office file; save the sheet as CSV"),
     (b"\x1f\x8b", "a gzip archive; unpack it first"),
@@ -46,9 +48,13 @@ def read_contents(path: str | os.PathLike[str]) -> Contents:
     file = Path(path)
     try:
         kind, reader = _reader(file)
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            contents = reader(file)
+        if kind == "text":
+            contents, caught = reader(file), []
+        else:
+            # The interpreter has one list of warning filters: whoever records warnings must be alone.
+            with _RECORDING_WARNINGS, warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                contents = reader(file)
     except RecordingError as error:
         raise _error(path, error) from error.__cause__
     except OSError as error:
