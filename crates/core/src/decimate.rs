@@ -26,7 +26,7 @@ use pulp::Simd;
 use crate::error::{Error, Result};
 
 /// Rejection of what would alias onto a kept bin, relative to the gain of that bin, in decibels.
-pub const ALIAS_DB: f64 = 220.0;
+pub const ALIAS_DB: f64 = 200.0;
 
 /// Halvings that share one pass: eight samples in, one out.
 const MAX_HALVINGS: usize = 3;
@@ -38,8 +38,8 @@ const IN_FLIGHT: usize = 8;
 const MAX_BLOCK: usize = IN_FLIGHT * LANES;
 /// Below this many points a transform is cheaper than another pass.
 const SHORTEST: usize = 512;
-/// A lone halving saves no more than half a transform: below this many points it costs as much itself.
-const SHORTEST_ALONE: usize = 8192;
+/// A pass of fewer halvings saves little of the transform: below this many points it costs as much itself.
+const SHORTEST_PARTIAL: usize = 8192;
 
 /// How P is carried out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -299,7 +299,7 @@ impl Cascade {
         while (4 << halvings.len()) <= data_decimation && (n >> (halvings.len() + 1)) >= SHORTEST {
             halvings.push(Halving::new((1 << halvings.len()) as f64 / (2.0 * data_decimation as f64)));
         }
-        if halvings.len() == 1 && n < SHORTEST_ALONE {
+        if halvings.len() < MAX_HALVINGS && n < SHORTEST_PARTIAL {
             halvings.clear();
         }
         // Full passes last would leave a short first pass over the longest data; so they come first.

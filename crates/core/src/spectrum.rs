@@ -138,12 +138,12 @@ impl Spectrum {
         self.first
     }
 
-    /// Gain of the cascade at each kept bin; `None` where there is no cascade.
-    pub(crate) fn droop(&self) -> Option<Vec<f64>> {
+    /// What makes good the droop of the cascade, a factor for each kept bin; `None` where there is no cascade.
+    pub(crate) fn correction(&self) -> Option<Vec<f64>> {
         if self.cascade.is_empty() {
             return None;
         }
-        Some((self.first..=self.last).map(|j| self.cascade.gain(j)).collect())
+        Some((self.first..=self.last).map(|j| 1.0 / self.cascade.gain(j)).collect())
     }
 
     pub(crate) fn state(&self) -> SpectrumState {

@@ -113,7 +113,7 @@ pub struct Evaluator {
     rate_hz: f64,
     chebyshev: Option<Chebyshev>,
     spectrum: Spectrum,
-    droop: Option<Vec<f64>>,
+    correction: Option<Vec<f64>>,
 }
 
 /// What changes during an evaluation: its buffers. Make one a thread.
@@ -167,8 +167,8 @@ impl Evaluator {
             }
             other => other,
         })?;
-        let droop = spectrum.droop();
-        Ok(Self { config, n_samples, rate_hz, chebyshev, spectrum, droop })
+        let correction = spectrum.correction();
+        Ok(Self { config, n_samples, rate_hz, chebyshev, spectrum, correction })
     }
 
     /// The settings.
@@ -232,10 +232,10 @@ impl Evaluator {
         };
         self.spectrum.visit(&state.spectrum, &mut collected);
         let Collect { first, mut target, mut measured } = collected;
-        if let Some(droop) = &self.droop {
-            for (k, gain) in droop.iter().enumerate() {
-                target[k] /= gain;
-                measured[k] /= gain;
+        if let Some(correction) = &self.correction {
+            for (k, factor) in correction.iter().enumerate() {
+                target[k] *= factor;
+                measured[k] *= factor;
             }
         }
         let magnitudes: Vec<f64> = target.iter().map(|x| weight(x.norm_sqr(), self.config.weight_power)).collect();
@@ -269,15 +269,19 @@ impl Evaluator {
 
     fn sum(&self, state: &SpectrumState) -> Sums {
         let (first, power) = (self.spectrum.first(), self.config.weight_power);
-        match (power, &self.droop) {
+        match (power, &self.correction) {
             (2, None) => self.sum_with(state, Weigh::<2, false>::new(&[], 0, 2)),
-            (2, Some(droop)) => self.sum_with(state, Weigh::<2, true>::new(droop, first, 2)),
+            (2, Some(correction)) => self.sum_with(state, Weigh::<2, true>::new(correction, first, 2)),
             (_, None) => self.sum_with(state, Weigh::<0, false>::new(&[], 0, power)),
-            (_, Some(droop)) => self.sum_with(state, Weigh::<0, true>::new(droop, first, power)),
+            (_, Some(correction)) => self.sum_with(state, Weigh::<0, true>::new(correction, first, power)),
         }
     }
 
-    fn sum_with<const L: u32, const DROOP: bool>(&self, state: &SpectrumState, mut weigh: Weigh<'_, L, DROOP>) -> Sums {
+    fn sum_with<const L: u32, const CORRECT: bool>(
+        &self,
+        state: &SpectrumState,
+        mut weigh: Weigh<'_, L, CORRECT>,
+    ) -> Sums {
         self.spectrum.visit(state, &mut weigh);
         weigh.sums()
     }
@@ -360,8 +364,8 @@ struct Sums {
 }
 
 /// Adds up O conj(I) |I|^(l-2), |I|^l and k |I|^l. `L` = 2 is compiled apart; 0 stands for any power.
-struct Weigh<'a, const L: u32, const DROOP: bool> {
-    droop: &'a [f64],
+struct Weigh<'a, const L: u32, const CORRECT: bool> {
+    correction: &'a [f64],
     first: usize,
     weight_power: u32,
     re: [f64; LANES],
@@ -371,10 +375,10 @@ struct Weigh<'a, const L: u32, const DROOP: bool> {
     energy: [f64; LANES],
 }
 
-impl<'a, const L: u32, const DROOP: bool> Weigh<'a, L, DROOP> {
-    fn new(droop: &'a [f64], first: usize, weight_power: u32) -> Self {
+impl<'a, const L: u32, const CORRECT: bool> Weigh<'a, L, CORRECT> {
+    fn new(correction: &'a [f64], first: usize, weight_power: u32) -> Self {
         let zero = [0.0; LANES];
-        Self { droop, first, weight_power, re: zero, im: zero, power: zero, moment: zero, energy: zero }
+        Self { correction, first, weight_power, re: zero, im: zero, power: zero, moment: zero, energy: zero }
     }
 
     fn sums(&self) -> Sums {
@@ -388,15 +392,15 @@ impl<'a, const L: u32, const DROOP: bool> Weigh<'a, L, DROOP> {
     }
 }
 
-impl<const L: u32, const DROOP: bool> Sink for Weigh<'_, L, DROOP> {
+impl<const L: u32, const CORRECT: bool> Sink for Weigh<'_, L, CORRECT> {
     #[inline(always)]
     fn take<const W: usize>(&mut self, bins: &Bins<W>) {
         for i in 0..W {
             let (mut ir, mut ii) = (bins.target_re[i], bins.target_im[i]);
             let (mut or, mut oi) = (bins.measured_re[i], bins.measured_im[i]);
-            if DROOP {
-                let inverse = 1.0 / self.droop[bins.first - self.first + i];
-                (ir, ii, or, oi) = (ir * inverse, ii * inverse, or * inverse, oi * inverse);
+            if CORRECT {
+                let factor = self.correction[bins.first - self.first + i];
+                (ir, ii, or, oi) = (ir * factor, ii * factor, or * factor, oi * factor);
             }
             let squared = ir * ir + ii * ii;
             let (mut re, mut im) = (or * ir + oi * ii, oi * ir - or * ii);
