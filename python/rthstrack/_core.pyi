@@ -5,6 +5,8 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from rthstrack.tracking import Settings
+
 __all__ = [
     "Evaluator",
     "__version__",
@@ -23,19 +25,7 @@ __version__: str
 
 @final
 class Evaluator:
-    def __new__(
-        cls,
-        n_samples: int,
-        rate_hz: float,
-        estimator: str,
-        data_decimation: int,
-        frequency_decimation: int,
-        decimator: str,
-        weight_power: int,
-        window: str,
-        detrend: str,
-        band_hz: tuple[float, float] | None,
-    ) -> Evaluator: ...
+    def __new__(cls, n_samples: int, rate_hz: float, settings: Settings) -> Evaluator: ...
     @property
     def n_bins(self) -> int: ...
     @property
@@ -52,14 +42,7 @@ def evaluate_moving(
     window_s: float,
     hop_s: float,
     minimum_std_ratio: float,
-    estimator: str,
-    data_decimation: int,
-    frequency_decimation: int,
-    decimator: str,
-    weight_power: int,
-    window: str,
-    detrend: str,
-    band_hz: tuple[float, float] | None,
+    settings: Settings,
 ) -> tuple[_Array, _Array, _Array, _Array, _Array, NDArray[np.bool_]]: ...
 def frequency_response(
     target: NDArray[Any],

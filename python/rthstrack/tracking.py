@@ -94,19 +94,6 @@ class Settings:
             band,
         )
 
-    def _arguments(self) -> tuple[Any, ...]:
-        """In the order in which the core takes them."""
-        return (
-            self.estimator,
-            self.data_decimation,
-            self.frequency_decimation,
-            self.decimator,
-            self.weight_power,
-            self.window,
-            self.detrend,
-            self.band_hz,
-        )
-
 
 def _count(name: str, value: Any) -> int:
     try:
@@ -307,7 +294,7 @@ class IndexHistories(_Result):
 
 @lru_cache(maxsize=64)
 def _plan(n_samples: int, rate_hz: float, settings: Settings) -> _core.Evaluator:
-    return _core.Evaluator(n_samples, rate_hz, *settings._arguments())
+    return _core.Evaluator(n_samples, rate_hz, settings)
 
 
 class Evaluator:
@@ -496,7 +483,7 @@ def evaluate_moving(
     time_s, amplitude, phase_rad, delay_s, frequency_hz, valid = _each_actuator(
         t,
         m,
-        lambda x, y: _core.evaluate_moving(x, y, rate_hz, window_s, hop_s, ratio, *settings._arguments()),
+        lambda x, y: _core.evaluate_moving(x, y, rate_hz, window_s, hop_s, ratio, settings),
     )
     time_s = time_s if time_s.ndim == 1 else time_s[:, 0]
     return MovingTracking(

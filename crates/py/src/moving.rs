@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use rthstrack::{MovingConfig, Pair};
 
 use crate::error::to_py;
-use crate::tracking::config;
+use crate::tracking::Settings;
 
 /// time_s, amplitude, phase_rad, delay_s, equivalent_frequency_hz, valid
 type Arrays<'py> = (
@@ -26,27 +26,9 @@ pub(crate) fn evaluate_moving<'py>(
     window_s: f64,
     hop_s: f64,
     minimum_std_ratio: f64,
-    estimator: &str,
-    data_decimation: usize,
-    frequency_decimation: usize,
-    decimator: &str,
-    weight_power: u32,
-    window: &str,
-    detrend: &str,
-    band_hz: Option<(f64, f64)>,
+    settings: Settings,
 ) -> PyResult<Arrays<'py>> {
-    let evaluator = config(
-        py,
-        estimator,
-        data_decimation,
-        frequency_decimation,
-        decimator,
-        weight_power,
-        window,
-        detrend,
-        band_hz,
-    )?;
-    let config = MovingConfig { window_s, hop_s, minimum_std_ratio, evaluator };
+    let config = MovingConfig { window_s, hop_s, minimum_std_ratio, evaluator: settings.config(py)? };
     let (target, measured) = (target.as_slice()?, measured.as_slice()?);
     let moving = py
         .detach(|| Pair::new(target, measured, rate_hz).and_then(|pair| rthstrack::evaluate_moving(&pair, &config)))

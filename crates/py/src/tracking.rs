@@ -24,28 +24,33 @@ pub(crate) fn numbers(t: &Tracking) -> Numbers {
     (t.amplitude, t.phase_rad, t.delay_s, t.equivalent_frequency_hz, t.fei)
 }
 
-/// The names of the settings to the core's own.
-pub(crate) fn config(
-    py: Python<'_>,
-    estimator: &str,
+/// `rthstrack.Settings`, read by its attributes.
+#[derive(FromPyObject)]
+pub(crate) struct Settings {
+    estimator: String,
     data_decimation: usize,
     frequency_decimation: usize,
-    decimator: &str,
+    decimator: String,
     weight_power: u32,
-    window: &str,
-    detrend: &str,
+    window: String,
+    detrend: String,
     band_hz: Option<(f64, f64)>,
-) -> PyResult<EvaluatorConfig> {
-    Ok(EvaluatorConfig {
-        estimator: choice(py, "estimator", &Estimator::NAMES, estimator)?,
-        data_decimation,
-        frequency_decimation,
-        decimator: choice(py, "decimator", &Decimator::NAMES, decimator)?,
-        weight_power,
-        window: choice(py, "window", &Window::NAMES, window)?,
-        detrend: choice(py, "detrend", &Detrend::NAMES, detrend)?,
-        band_hz,
-    })
+}
+
+impl Settings {
+    /// Names become the core's own choices.
+    pub(crate) fn config(&self, py: Python<'_>) -> PyResult<EvaluatorConfig> {
+        Ok(EvaluatorConfig {
+            estimator: choice(py, "estimator", &Estimator::NAMES, &self.estimator)?,
+            data_decimation: self.data_decimation,
+            frequency_decimation: self.frequency_decimation,
+            decimator: choice(py, "decimator", &Decimator::NAMES, &self.decimator)?,
+            weight_power: self.weight_power,
+            window: choice(py, "window", &Window::NAMES, &self.window)?,
+            detrend: choice(py, "detrend", &Detrend::NAMES, &self.detrend)?,
+            band_hz: self.band_hz,
+        })
+    }
 }
 
 /// The checked plan for records of one length and rate.
@@ -58,32 +63,8 @@ pub(crate) struct Evaluator {
 #[pymethods]
 impl Evaluator {
     #[new]
-    #[pyo3(signature = (n_samples, rate_hz, estimator, data_decimation, frequency_decimation, decimator, weight_power, window, detrend, band_hz))]
-    fn new(
-        py: Python<'_>,
-        n_samples: usize,
-        rate_hz: f64,
-        estimator: &str,
-        data_decimation: usize,
-        frequency_decimation: usize,
-        decimator: &str,
-        weight_power: u32,
-        window: &str,
-        detrend: &str,
-        band_hz: Option<(f64, f64)>,
-    ) -> PyResult<Self> {
-        let config = config(
-            py,
-            estimator,
-            data_decimation,
-            frequency_decimation,
-            decimator,
-            weight_power,
-            window,
-            detrend,
-            band_hz,
-        )?;
-        let plan = rthstrack::Evaluator::new(n_samples, rate_hz, config).map_err(|e| to_py(py, &e))?;
+    fn new(py: Python<'_>, n_samples: usize, rate_hz: f64, settings: Settings) -> PyResult<Self> {
+        let plan = rthstrack::Evaluator::new(n_samples, rate_hz, settings.config(py)?).map_err(|e| to_py(py, &e))?;
         Ok(Self { plan, states: Mutex::default() })
     }
 
