@@ -473,10 +473,10 @@ def test_gaps_are_filled_by_straight_lines_up_to_the_length_asked_for() -> None:
     assert dict(recording.filled(3).n_filled) == {"group/x": 6}
 
 
-def test_a_gap_beside_an_infinite_sample_is_not_filled() -> None:
-    recording = recording_of(x=[1, math.inf, math.nan, 3, math.nan, 5]).filled(5)
-    assert math.isnan(recording["x"].values[2])
-    assert recording["x"].values[4] == 4.0
+def test_infinite_samples_are_missing_ones() -> None:
+    recording = recording_of(x=[1, math.inf, math.nan, 4, math.nan, 6]).filled(2)
+    assert recording["x"].values.tolist() == [1, 2, 3, 4, 5, 6]
+    assert recording.n_filled == {"group/x": 3}
     with pytest.raises(SettingError, match="expected a gap of at least 1 sample, found 0"):
         recording.filled(0)
 

@@ -121,7 +121,7 @@ class Recording:
         return replace(self, channels=channels, start_s=self.start_s + first / self.rate_hz, notes=tuple(notes))
 
     def filled(self, max_gap_samples: int) -> Recording:
-        """Gaps of up to `max_gap_samples` NaN between finite samples replaced by linear interpolation.
+        """Gaps of up to `max_gap_samples` NaN or infinite samples replaced by linear interpolation.
 
         Longer gaps and those at the ends stay. `n_filled` and `notes` say how many samples were filled in each channel.
         """
@@ -480,13 +480,12 @@ def _frozen(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _filled(values: NDArray[np.float64], longest: int) -> tuple[NDArray[np.float64], int, int]:
     """The values with short gaps interpolated, how many samples that were, and in how many gaps."""
-    missing = np.isnan(values)
+    missing = ~np.isfinite(values)
     if not missing.any():
         return values, 0, 0
     edges = np.flatnonzero(np.diff(np.concatenate([[False], missing, [False]]).astype(np.int8)))
     starts, ends = edges[::2], edges[1::2]
     inner = (starts > 0) & (ends < len(values)) & (ends - starts <= longest)
-    inner[inner] &= np.isfinite(values[starts[inner] - 1]) & np.isfinite(values[ends[inner]])
     wanted = np.zeros(len(values) + 1, dtype=np.int64)
     np.add.at(wanted, starts[inner], 1)
     np.add.at(wanted, ends[inner], -1)
