@@ -6,18 +6,19 @@ The command, the report and the figures take an `Assessment` and compute nothing
 from __future__ import annotations
 
 import dataclasses
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rthstrack import verdict as words
+from rthstrack.display import signal_roles
 from rthstrack.errors import SettingError, SignalError
 from rthstrack.tracking import Evaluator, Settings, evaluate_moving, frequency_response, index_histories, indices
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from numpy.typing import ArrayLike, NDArray
 
     from rthstrack.tracking import FrequencyResponse, IndexHistories, Indices, MovingTracking, Tracking
@@ -139,15 +140,60 @@ def assess(
         indices=indices(t, m, rate_hz),
         histories=index_histories(t, m, rate_hz),
         settings=evaluation | {"moving_s": window_s, "hop_s": hop_s} | dict(origin or {}),
-        verdict=words.sentence(tracking, *_ROLES[part]),
+        verdict=words.sentence(tracking, *signal_roles(part)),
         warnings=words.warnings(t, m, tracking, moving, response, (unit, measured_unit or unit), names),
         limits=limits,
         exceeded=words.exceeded(tracking, limits),
     )
 
 
-_ROLES = {
-    "whole": ("target", "measured"),
-    "compensator": ("target", "command"),
-    "actuator": ("command", "measured"),
-}
+def result_entry(a: Assessment) -> dict[str, Any]:
+    """One result as `rthstrack evaluate --json` prints it: numbers at full precision, None where not determined."""
+    t, i = a.tracking, a.indices
+    entry: dict[str, Any] = {
+        "file": a.file,
+        "actuator": a.actuator,
+        "target": a.target_name,
+        "measured": a.measured_name,
+        "unit": a.unit,
+        "rate_hz": a.rate_hz,
+        "n_samples": t.n_samples,
+        "amplitude": t.amplitude,
+        "delay_s": t.delay_s,
+        "phase_rad": t.phase_rad,
+        "equivalent_frequency_hz": t.equivalent_frequency_hz,
+        "n_bins": t.n_bins,
+        "delta_f_hz": t.delta_f_hz,
+        "settings": a.settings,
+        "indices": {
+            "max_tracking_error": i.max_tracking_error,
+            "max_tracking_error_percent": i.max_tracking_error_percent,
+            "rms_error": i.rms_error,
+            "rms_error_percent": i.rms_error_percent,
+            "tracking_indicator": i.tracking_indicator,
+            "j1_s": i.j1_s,
+            "j2_percent": i.j2_percent,
+            "j3_percent": i.j3_percent,
+        },
+        "warnings": [*a.warnings, *a.exceeded],
+    }
+    return {key: json_ready(value) for key, value in entry.items()}
+
+
+def json_ready(value: Any) -> Any:
+    """The value in types that JSON knows; NaN and infinities become None."""
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    if isinstance(value, int | np.integer):
+        return int(value)
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else None
+    if isinstance(value, complex | np.complexfloating):
+        return [json_ready(value.real), json_ready(value.imag)]
+    if isinstance(value, Mapping):
+        return {str(key): json_ready(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return json_ready(value.tolist())
+    if isinstance(value, list | tuple):
+        return [json_ready(item) for item in value]
+    return value if value is None or isinstance(value, str) else str(value)

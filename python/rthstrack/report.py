@@ -22,6 +22,7 @@ import numpy as np
 
 from rthstrack import display
 from rthstrack._core import __version__
+from rthstrack.assessment import json_ready, result_entry
 from rthstrack.errors import SettingError
 
 if TYPE_CHECKING:
@@ -152,24 +153,10 @@ def report_html(assessments: Sequence[Assessment]) -> str:
 
 def result_record(assessment: Assessment) -> dict[str, Any]:
     """The numbers of one assessment at full precision, ready for JSON; a number that is not determined is None."""
-    a, tracking = assessment, assessment.tracking
-    record: dict[str, Any] = {
-        "file": a.file,
-        "actuator": a.actuator,
+    a = assessment
+    record = result_entry(a) | {
         "part": a.part,
-        "target": a.target_name,
-        "measured": a.measured_name,
-        "unit": a.unit,
-        "rate_hz": a.rate_hz,
         "start_s": a.start_s,
-        "n_samples": int(a.target.size),
-        "amplitude": tracking.amplitude,
-        "delay_s": tracking.delay_s,
-        "phase_rad": tracking.phase_rad,
-        "equivalent_frequency_hz": tracking.equivalent_frequency_hz,
-        "n_bins": tracking.n_bins,
-        "delta_f_hz": tracking.delta_f_hz,
-        "settings": {**dataclasses.asdict(tracking.settings), **a.settings},
         "indices": dataclasses.asdict(a.indices),
         "moving": None,
         "response": None,
@@ -190,9 +177,7 @@ def result_record(assessment: Assessment) -> dict[str, Any]:
     if a.response is not None:
         names = ("segment_s", "overlap", "n_segments", "window", "detrend")
         record["response"] = {name: getattr(a.response, name) for name in names}
-    plain = _plain(record)
-    assert isinstance(plain, dict)
-    return plain
+    return {key: json_ready(value) for key, value in record.items()}
 
 
 # ---------------------------------------------------------------------------------------------------- numbers and texts
@@ -220,25 +205,6 @@ def _reasons(a: Assessment) -> dict[str, str]:
 def _why(note: str | None) -> str:
     """A note of the assessment as the reason alone; what it is the reason for is said where it is shown."""
     return (note or "was not evaluated").removeprefix(f"{NOT_DETERMINED}: ")
-
-
-def _plain(value: Any) -> Any:
-    """The value in types that JSON knows; NaN and infinities become None."""
-    if isinstance(value, bool | np.bool_):
-        return bool(value)
-    if isinstance(value, int | np.integer):
-        return int(value)
-    if isinstance(value, float | np.floating):
-        return float(value) if math.isfinite(value) else None
-    if isinstance(value, complex | np.complexfloating):
-        return [_plain(value.real), _plain(value.imag)]
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return value if value is None or isinstance(value, str) else str(value)
 
 
 def _number(
@@ -370,7 +336,7 @@ def _drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any]:
         "response": _response_drawing(a, blocks),
         "frequency": _frequency_drawing(a),
     }
-    plain = _plain(drawing)
+    plain = json_ready(drawing)
     assert isinstance(plain, dict)
     return plain
 

@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rthstrack.assessment import Assessment, Limits, assess
+from rthstrack.assessment import Assessment, Limits, assess, result_entry
 from rthstrack.errors import RecordingError, RthstrackError, SettingError, SignalError
 from rthstrack.recording import Recording, propose_pair, read_recording
 from rthstrack.tracking import Settings
@@ -94,7 +94,7 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
             "results": [result_entry(a) for a in assessments],
             "failures": [{"file": file, "error": error} for file, error in failures],
         }
-        print(json.dumps(_json_safe(document), indent=2, ensure_ascii=False, allow_nan=False))
+        print(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False))
     else:
         _print_text(results, len(args.files))
     for _, error in failures:
@@ -104,38 +104,6 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
     if failures:
         return FAILED
     return EXCEEDED if any(a.exceeded for a in assessments) else 0
-
-
-def result_entry(a: Assessment) -> dict[str, Any]:
-    """One result as `--json` prints it, numbers at full precision."""
-    t, i = a.tracking, a.indices
-    return {
-        "file": a.file,
-        "actuator": a.actuator,
-        "target": a.target_name,
-        "measured": a.measured_name,
-        "unit": a.unit,
-        "rate_hz": a.rate_hz,
-        "n_samples": t.n_samples,
-        "amplitude": t.amplitude,
-        "delay_s": t.delay_s,
-        "phase_rad": t.phase_rad,
-        "equivalent_frequency_hz": t.equivalent_frequency_hz,
-        "n_bins": t.n_bins,
-        "delta_f_hz": t.delta_f_hz,
-        "settings": a.settings,
-        "indices": {
-            "max_tracking_error": i.max_tracking_error,
-            "max_tracking_error_percent": i.max_tracking_error_percent,
-            "rms_error": i.rms_error,
-            "rms_error_percent": i.rms_error_percent,
-            "tracking_indicator": i.tracking_indicator,
-            "j1_s": i.j1_s,
-            "j2_percent": i.j2_percent,
-            "j3_percent": i.j3_percent,
-        },
-        "warnings": [*a.warnings, *a.exceeded],
-    }
 
 
 def assess_file(file: str, args: argparse.Namespace) -> list[Assessment]:
@@ -450,17 +418,6 @@ def _print_table_of_all(console: Console, assessments: Sequence[Assessment]) -> 
     for a in assessments:
         for text in (*a.exceeded, *a.warnings):
             console.print(Text(f"{a.file}: ", style="yellow") + Text(text))
-
-
-def _json_safe(value: Any) -> Any:
-    """JSON has no NaN: what is not determined is null."""
-    if isinstance(value, dict):
-        return {str(k): _json_safe(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_json_safe(v) for v in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 def _number(text: str) -> float:
