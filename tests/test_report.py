@@ -35,6 +35,20 @@ FLAGS = [
 # A page of 200,000 drawn samples opens in a second or two; a loaded machine gets a minute.
 PATIENCE_MS = 60_000
 
+
+def wait_until(page: Page, condition: str, arg: Any = None) -> None:
+    """Waits until `condition` holds in the page.
+
+    Not Playwright's own wait_for_function: where the condition does not hold at once it polls from inside the page,
+    with an eval that the page's content security policy forbids.
+    """
+    for _ in range(PATIENCE_MS // 50):
+        if page.evaluate(condition, arg):
+            return
+        page.wait_for_timeout(50)
+    pytest.fail(f"never came true: {condition}")
+
+
 SHOWN_DIGITS = 6e-4  # half a unit of the fourth digit, relative to 1
 
 
@@ -265,15 +279,18 @@ def test_dragging_zooms_every_chart_over_time_and_a_double_click_leads_back(
     report = opened(plain)
     whole = report.scale("history")
     report.drag("history", 0.25, 0.5)
-    report.page.wait_for_function(
-        "limit => document.querySelector('[data-chart=history]').chart.u.scales.x.max < limit", arg=whole[1] - 10
+    wait_until(
+        report.page,
+        "limit => document.querySelector('[data-chart=history]').chart.u.scales.x.max < limit",
+        arg=whole[1] - 10,
     )
     zoomed = report.scale("history")
     width = whole[1] - whole[0]
     assert zoomed == pytest.approx((whole[0] + width / 4, whole[0] + width / 2), abs=0.01 * width)
     for chart in ("error", "moving-amplitude", "moving-delay", "running-errors", "indicator"):
         assert report.scale(chart) == zoomed, chart
-    report.page.wait_for_function(
+    wait_until(
+        report.page,
         "n => document.querySelector('[data-chart=loop]').chart.u.data[1][0].length < n",
         arg=plain.target.size // 2,
     )
@@ -287,8 +304,8 @@ def test_dragging_zooms_every_chart_over_time_and_a_double_click_leads_back(
     assert low < plain.target[inside].min() < plain.target[inside].max() < high
     area = report.page.locator("[data-chart=history] .u-over")
     area.dblclick()
-    report.page.wait_for_function(
-        "end => document.querySelector('[data-chart=history]').chart.u.scales.x.max === end", arg=whole[1]
+    wait_until(
+        report.page, "end => document.querySelector('[data-chart=history]').chart.u.scales.x.max === end", arg=whole[1]
     )
     assert report.scale("indicator") == whole
 
@@ -494,7 +511,7 @@ def test_no_window_is_too_narrow_for_the_page(opened: Callable[..., Opened]) -> 
     report = opened(*examples.parts_of_a_test(Limits(delay_s=0.02)))
     for width in (1400, 800, 390):
         report.page.set_viewport_size({"width": width, "height": 900})
-        report.page.wait_for_function("document.querySelector('[data-chart=history]').chart.u.width < innerWidth")
+        wait_until(report.page, "document.querySelector('[data-chart=history]').chart.u.width < innerWidth")
         assert report.page.evaluate("document.documentElement.scrollWidth") == width
 
 
@@ -548,7 +565,7 @@ def test_the_live_page_can_use_the_charts_alone(browser: Browser) -> None:
         "chart.setData([[5, 6, 7], [11, 12, 13], [12, 13, 14], [10, 11, 12]])"
     )
     page.evaluate("loop.setData([0, 2, 4], [0, 3, 4])")
-    page.wait_for_function("chart.u.scales.x.max === 7")
+    wait_until(page, "chart.u.scales.x.max === 7")
     scales = page.evaluate("[chart.u.scales.x.min, chart.u.scales.y.min, chart.u.scales.y.max, loop.u.scales.x.max]")
     assert scales[0] == 5
     assert scales[1] < 10
