@@ -299,9 +299,9 @@ impl Evaluator {
         let round_off = self.spectrum.fft_len() as f64 * energy_at_least(pair.target()) * ROUND_OFF_SHARE;
         if !power_in_range || energy <= round_off {
             let peak = peak(pair.target());
-            let largest = weight(peak * peak, self.config.weight_power.max(2));
-            let in_range = SUMS.contains(&largest) && SUMS.contains(&weight(peak * peak, self.config.weight_power));
-            return Err(if in_range && power <= 1.0 / f64::MIN_POSITIVE {
+            // The energy is summed beside the weights, so both must fit.
+            let fits = |power| SUMS.contains(&weight(peak * peak, power));
+            return Err(if fits(2) && fits(self.config.weight_power) && power.is_finite() {
                 Error::NoEnergy
             } else {
                 Error::Range { signal: Signal::Target, peak, weight_power: self.config.weight_power }
