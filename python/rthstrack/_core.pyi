@@ -5,16 +5,22 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from rthstrack import simulate
 from rthstrack.tracking import Settings
 
 __all__ = [
     "Evaluator",
+    "VirtualTest",
     "__version__",
+    "check_test",
     "evaluate_moving",
     "frequency_response",
+    "from_matrices",
     "index_histories",
     "indices",
     "read_text",
+    "sdof",
+    "shear_building",
 ]
 
 _Numbers = tuple[float, float, float, float, complex]
@@ -35,6 +41,30 @@ class Evaluator:
         self, target: NDArray[Any], measured: NDArray[Any]
     ) -> list[tuple[_Numbers, _Spectra]]: ...
 
+_Mistakes = list[tuple[str, str]]
+_Structure = tuple[tuple[_Array, _Array, _Array, _Array] | None, _Mistakes]
+
+@final
+class VirtualTest:
+    def __new__(cls, test: simulate.VirtualTest) -> VirtualTest: ...
+    def run(
+        self, ground: NDArray[Any], noise: list[list[float] | None]
+    ) -> tuple[tuple[_Array, _Array, _Array, _Array, _Array, int, float] | None, tuple[float, float] | None]: ...
+    def critical_delay(self) -> tuple[float, float, float, bool]: ...
+    def delay_damping(self, delay_s: float) -> tuple[_Array, _Array, _Array, _Array]: ...
+    def true_response(self, actuator: int, frequency_hz: NDArray[Any]) -> NDArray[np.complex128] | None: ...
+
+def check_test(test: simulate.VirtualTest) -> _Mistakes: ...
+def sdof(frequency_hz: float, damping_ratio: float, mass_kg: float) -> _Structure: ...
+def shear_building(
+    masses_kg: list[float], stiffnesses: list[float], damped: simulate.ModalDamping | simulate.RayleighDamping
+) -> _Structure: ...
+def from_matrices(
+    mass: NDArray[Any],
+    stiffness: NDArray[Any],
+    damped: NDArray[Any] | simulate.ModalDamping | simulate.RayleighDamping,
+    influence: list[float],
+) -> _Structure: ...
 def evaluate_moving(
     target: NDArray[Any],
     measured: NDArray[Any],

@@ -3,6 +3,8 @@
 
 use std::fmt;
 
+use crate::dynamics::Mistake;
+
 /// Which signal of a pair an error speaks of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Signal {
@@ -12,6 +14,8 @@ pub enum Signal {
     Measured,
     /// The measured restoring force.
     Force,
+    /// The ground acceleration of a virtual test.
+    GroundMotion,
 }
 
 impl fmt::Display for Signal {
@@ -20,6 +24,7 @@ impl fmt::Display for Signal {
             Signal::Target => "target",
             Signal::Measured => "measured",
             Signal::Force => "force",
+            Signal::GroundMotion => "ground motion",
         })
     }
 }
@@ -129,6 +134,15 @@ pub enum Error {
         /// Length and rate of the pair.
         found: (usize, f64),
     },
+    /// A virtual test's configuration, with everything that is wrong in it.
+    Configuration(Vec<Mistake>),
+    /// A virtual test left its bounds.
+    Unstable {
+        /// When, in seconds from its start.
+        time_s: f64,
+        /// The displacement that it may not exceed, m.
+        bound_m: f64,
+    },
 }
 
 impl fmt::Display for Error {
@@ -195,6 +209,15 @@ impl fmt::Display for Error {
                 "this evaluator is planned for {} samples at {} Hz, not for {} at {} Hz",
                 expected.0, expected.1, found.0, found.1
             ),
+            Error::Configuration(mistakes) => {
+                for (i, mistake) in mistakes.iter().enumerate() {
+                    write!(f, "{}{mistake}", if i == 0 { "" } else { "; " })?;
+                }
+                Ok(())
+            }
+            Error::Unstable { time_s, bound_m } => {
+                write!(f, "unstable: a displacement exceeded {bound_m:.4} m at {time_s:.3} s")
+            }
         }
     }
 }

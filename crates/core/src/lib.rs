@@ -14,11 +14,15 @@
 //! 7. [`response`]: gain, phase, delay and coherence over frequency.
 //! 8. [`mod@indices`]: the time-domain indices in use beside them.
 //!
+//! [`dynamics`] makes such signals: virtual tests of structures with actuators that lag. It and the evaluation do not know
+//! each other.
+//!
 //! Signs: a positive delay means that measured lags target; amplitude 1 is perfect. Units are SI.
 
 #![forbid(unsafe_code)]
 
 pub mod decimate;
+pub mod dynamics;
 pub mod error;
 pub mod indices;
 pub mod moving;

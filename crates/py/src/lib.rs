@@ -2,6 +2,7 @@
 
 use pyo3::prelude::*;
 
+mod dynamics;
 mod error;
 mod indices;
 mod moving;
@@ -18,6 +19,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(response::frequency_response, m)?)?;
     m.add_function(wrap_pyfunction!(indices::indices, m)?)?;
     m.add_function(wrap_pyfunction!(indices::index_histories, m)?)?;
+    dynamics::register(m)?;
     text::register(m)?;
     Ok(())
 }

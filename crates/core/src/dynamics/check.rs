@@ -1,0 +1,55 @@
+//! Every mistake of a configuration at once, each with the key it is about.
+
+use std::fmt::{self, Display};
+
+/// One thing wrong with a configuration.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mistake {
+    /// Where: `actuator[1].delay_s`, numbered from 1.
+    pub key: String,
+    /// What was expected and found.
+    pub message: String,
+}
+
+impl Display for Mistake {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.key, self.message)
+    }
+}
+
+/// Gathers mistakes under a prefix of keys.
+#[derive(Debug, Default)]
+pub(crate) struct Checks {
+    prefix: String,
+    pub(crate) mistakes: Vec<Mistake>,
+}
+
+impl Checks {
+    /// Runs `check` with keys that begin with `prefix`.
+    pub(crate) fn under(&mut self, prefix: &str, check: impl FnOnce(&mut Self)) {
+        let outer = std::mem::take(&mut self.prefix);
+        self.prefix = format!("{outer}{prefix}.");
+        check(self);
+        self.prefix = outer;
+    }
+
+    /// A mistake in words.
+    pub(crate) fn mistake(&mut self, key: &str, message: impl Into<String>) {
+        self.mistakes.push(Mistake { key: format!("{}{key}", self.prefix), message: message.into() });
+    }
+
+    /// A mistake unless `holds`.
+    pub(crate) fn demand(&mut self, key: &str, holds: bool, expected: &str, found: impl Display) {
+        if !holds {
+            self.mistake(key, format!("expected {expected}, found {found}"));
+        }
+    }
+}
+
+pub(crate) fn positive(checks: &mut Checks, key: &str, found: f64) {
+    checks.demand(key, found.is_finite() && found > 0.0, "a positive number", found);
+}
+
+pub(crate) fn nonnegative(checks: &mut Checks, key: &str, found: f64) {
+    checks.demand(key, found.is_finite() && found >= 0.0, "a number of at least 0", found);
+}

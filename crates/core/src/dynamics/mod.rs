@@ -1,0 +1,35 @@
+//! Virtual tests: a structure of which part is computed and part is a specimen, moved by actuators that lag.
+//!
+//!     M x'' + C x' + K x + sum of restoring forces = -M i a_g
+//!
+//! Data flows through the modules in this order:
+//!
+//! 1. [`structure`]: M, C, K of the whole structure, elastic.
+//! 2. [`law`]: restoring forces of specimens and of members that yield.
+//! 3. [`actuator`], `compensator`, `history`: from target to command to measured motion and force.
+//! 4. [`virtual_test`]: what is tested, checked whole (`check`), and split into its two parts.
+//! 5. `continuous`: the delay equation in continuous time; `sampled`: the loop of a laboratory's computer.
+//! 6. [`stability`]: the delay that a loop bears, and what a delay costs in damping.
+//!
+//! Degrees of freedom are numbered from 1; 0 is the ground. A positive delay means that measured lags target. SI units. Knows
+//! nothing of the evaluation, which knows nothing of it.
+
+pub mod actuator;
+mod check;
+mod compensator;
+mod continuous;
+mod history;
+pub mod law;
+mod sampled;
+pub mod stability;
+pub mod structure;
+pub mod virtual_test;
+
+pub use actuator::{Actuator, Converter, Delay, Dynamics, SampledActuator, SampledActuatorState, ServoHydraulic};
+pub use check::Mistake;
+pub use compensator::Compensation;
+pub use history::Motion;
+pub use law::{BoucWen, Law, Memory};
+pub use stability::{CriticalDelay, DelayDamping};
+pub use structure::{Damping, Structure};
+pub use virtual_test::{Element, Noise, Run, Stepping, TestConfig, VirtualTest};

@@ -1,0 +1,149 @@
+//! The loop of a laboratory's computer: integrate, compensate, move, measure, once a sample.
+
+use nalgebra::DMatrix;
+
+use super::actuator::{SampledActuator, SampledActuatorState};
+use super::compensator::CompensatorState;
+use super::history::Motion;
+use super::law::Memory;
+use super::structure::rows;
+use super::virtual_test::{Noise, Run, VirtualTest, across_add};
+use crate::error::{Error, Result};
+
+/// An explicit integrator: from the motion at one sample to displacement and velocity at the next, before any force there is known.
+trait Explicit {
+    /// x, v at t from x, v, a at t - dt.
+    fn predict(&self, x: &mut [f64], v: &mut [f64], a: &[f64], scratch: &mut [f64]);
+}
+
+/// Chen and Ricles (2008): x += dt v + dt^2 alpha a, v += dt alpha a, alpha = 4 (4 M + 2 dt C + dt^2 K)^-1 M.
+struct Cr {
+    alpha: Vec<f64>,
+    dt: f64,
+}
+
+impl Cr {
+    fn new(test: &VirtualTest) -> Option<Self> {
+        let (whole, dt) = (test.whole(), 1.0 / test.config.rate_hz);
+        let inverse = (4.0 * &whole.mass + 2.0 * dt * whole.damping + dt * dt * whole.stiffness).try_inverse()?;
+        Some(Self { alpha: rows(&(4.0 * inverse * whole.mass)), dt })
+    }
+}
+
+impl Explicit for Cr {
+    #[inline]
+    fn predict(&self, x: &mut [f64], v: &mut [f64], a: &[f64], scratch: &mut [f64]) {
+        multiply(&self.alpha, a, scratch);
+        for i in 0..x.len() {
+            let change = self.dt * scratch[i];
+            x[i] += self.dt * (v[i] + change);
+            v[i] += change;
+        }
+    }
+}
+
+/// out = matrix * x, row by row.
+#[inline]
+pub(crate) fn multiply(matrix: &[f64], x: &[f64], out: &mut [f64]) {
+    let n = x.len();
+    for (row, out) in matrix.chunks_exact(n).zip(out.iter_mut()) {
+        *out = row.iter().zip(x).map(|(a, b)| a * b).sum();
+    }
+}
+
+struct Rig {
+    plan: SampledActuator,
+    state: SampledActuatorState,
+    compensator: CompensatorState,
+    velocity: f64,
+    measured: f64,
+    /// Forces on their way to the computer, oldest next.
+    late: Vec<f64>,
+}
+
+pub(crate) fn run(test: &VirtualTest, ground: &[f64], noise: &Noise, bound: f64) -> Result<Run> {
+    let config = &test.config;
+    let (n, rate) = (config.structure.n_dof(), config.rate_hz);
+    let dt = 1.0 / rate;
+    let singular = || super::virtual_test::configuration("structure.mass_kg", "expected matrices that can be inverted");
+    let integrator = Cr::new(test).ok_or_else(singular)?;
+    let inverse = rows(&test.numerical.mass.clone().try_inverse().ok_or_else(singular)?);
+    let (damping, stiffness) = (rows(&test.numerical.damping), rows(&test.numerical.stiffness));
+    let viscous = test.numerical.damping != DMatrix::zeros(n, n);
+    let elastic = test.numerical.stiffness != DMatrix::zeros(n, n);
+    let mut rigs: Vec<Rig> = config
+        .actuators
+        .iter()
+        .map(|actuator| {
+            let plan = SampledActuator::planned(actuator, rate);
+            Rig {
+                state: plan.state(),
+                plan,
+                compensator: actuator.compensation.state(rate),
+                velocity: 0.0,
+                measured: 0.0,
+                late: vec![0.0; actuator.force_delay_samples],
+            }
+        })
+        .collect();
+    let mut memories: Vec<Memory> = vec![[0.0; 2]; config.elements.len()];
+    let mut places = vec![0.0; config.elements.len()];
+    let (mut x, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    let (mut force, mut scratch) = (vec![0.0; n], vec![0.0; n]);
+    let mut run = Run::sized(rigs.len(), n, ground.len(), 1);
+    let heard = |channel: usize, sample: usize| noise.get(channel).and_then(Option::as_ref).map_or(0.0, |n| n[sample]);
+
+    for sample in 0..ground.len() {
+        if sample > 0 {
+            integrator.predict(&mut x, &mut v, &a, &mut scratch);
+        }
+        for i in 0..n {
+            force[i] = -test.load[i] * ground[sample];
+        }
+        if viscous {
+            multiply(&damping, &v, &mut scratch);
+            force.iter_mut().zip(&scratch).for_each(|(f, s)| *f -= s);
+        }
+        if elastic {
+            multiply(&stiffness, &x, &mut scratch);
+            force.iter_mut().zip(&scratch).for_each(|(f, s)| *f -= s);
+        }
+        for ((element, memory), place) in config.elements.iter().zip(&mut memories).zip(&mut places) {
+            let to = element.across(&x);
+            element.law.advance(*place, to, dt, memory);
+            *place = to;
+            across_add(&mut force, element.dof, element.from_dof, -element.law.force(to, element.across(&v), memory));
+        }
+        for (i, (rig, actuator)) in rigs.iter_mut().zip(&config.actuators).enumerate() {
+            let velocity = actuator.across(&v);
+            let target =
+                Motion { displacement: actuator.across(&x), velocity, acceleration: (velocity - rig.velocity) * rate };
+            rig.velocity = velocity;
+            let mut command = actuator.compensation.step(&mut rig.compensator, target, rate, rig.measured);
+            let sent = actuator.command_converter.convert(command.displacement + heard(3 * i, sample));
+            if sent.abs() >= actuator.command_converter.limit {
+                command.velocity = 0.0;
+            }
+            command.displacement = sent;
+            let (motion, answer) = rig.plan.step(&mut rig.state, command);
+            rig.measured = actuator.displacement_sensor.convert(motion.displacement + heard(3 * i + 1, sample));
+            let felt = actuator.force_sensor.convert(answer + heard(3 * i + 2, sample));
+            run.target[i][sample] = target.displacement;
+            run.command[i][sample] = sent;
+            run.measured[i][sample] = rig.measured;
+            run.force[i][sample] = felt;
+            let arrived = if rig.late.is_empty() { felt } else { std::mem::replace(&mut rig.late[sample % actuator.force_delay_samples], felt) };
+            across_add(&mut force, actuator.dof, actuator.from_dof, -arrived);
+        }
+        multiply(&inverse, &force, &mut a);
+        let mut within = true;
+        for i in 0..n {
+            run.displacement[i][sample] = x[i];
+            within &= x[i].abs() <= bound && a[i].is_finite();
+        }
+        if !within || rigs.iter().any(|rig| !(rig.measured.abs() <= bound)) {
+            return Err(Error::Unstable { time_s: sample as f64 * dt, bound_m: bound });
+        }
+    }
+    Ok(run)
+}
