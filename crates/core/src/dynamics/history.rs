@@ -47,6 +47,31 @@ pub(crate) fn hermite(s: f64, h: f64, p0: f64, d0: f64, p1: f64, d1: f64) -> (f6
     (p0 + s * (h * d0 + s * (c2 + s * c3)), d0 + s * (2.0 * c2 + 3.0 * s * c3) / h)
 }
 
+/// A constant distance behind the newest motion: the steps and the Hermite weights of the motions on either side.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Tap {
+    whole: usize,
+    /// Motions that must have been.
+    reach: usize,
+    value: [f64; 4],
+    slope: [f64; 4],
+}
+
+impl Tap {
+    /// `steps` >= 0 of `step_s` behind the newest.
+    pub(crate) fn new(steps: f64, step_s: f64) -> Self {
+        let whole = steps as usize;
+        let (s, h) = (1.0 - (steps - whole as f64), step_s);
+        let left = 1.0 - s;
+        Self {
+            whole,
+            reach: whole + usize::from(s < 1.0),
+            value: [(1.0 + 2.0 * s) * left * left, s * left * left * h, s * s * (3.0 - 2.0 * s), -s * s * left * h],
+            slope: [-6.0 * s * left / h, left * (1.0 - 3.0 * s), 6.0 * s * left / h, s * (3.0 * s - 2.0)],
+        }
+    }
+}
+
 /// The last motions of a point on a grid of steps, in a ring; at rest before the first.
 #[derive(Debug, Clone)]
 pub(crate) struct History {
@@ -110,6 +135,24 @@ impl History {
         }
         let (velocity, acceleration) = hermite(s, h, old.velocity, old.acceleration, new.velocity, new.acceleration);
         Motion { displacement, velocity, acceleration }
+    }
+
+    /// The same at a constant distance, on a grid whose newest acceleration is known.
+    #[inline]
+    pub(crate) fn at(&self, tap: &Tap) -> Motion {
+        if tap.reach >= self.n_pushed {
+            return Motion::default();
+        }
+        let new = self.n_pushed - 1 - tap.whole;
+        let old = self.ring[new.wrapping_sub(1) & self.mask];
+        let new = self.ring[new & self.mask];
+        let (p, d) = (&tap.value, &tap.slope);
+        let mix = |w: &[f64; 4], p0, d0, p1, d1| w[0] * p0 + w[1] * d0 + w[2] * p1 + w[3] * d1;
+        Motion {
+            displacement: mix(p, old.displacement, old.velocity, new.displacement, new.velocity),
+            velocity: mix(p, old.velocity, old.acceleration, new.velocity, new.acceleration),
+            acceleration: mix(d, old.velocity, old.acceleration, new.velocity, new.acceleration),
+        }
     }
 
     /// The same on a grid of samples, whose accelerations are only differences: velocity is the interpolant's slope,

@@ -92,15 +92,6 @@ impl BoucWen {
 }
 
 impl Law {
-    /// How many of the memory's numbers are in use.
-    pub fn n_memory(&self) -> usize {
-        match self {
-            Law::Spring { .. } | Law::Dashpot { .. } | Law::KelvinVoigt { .. } => 0,
-            Law::Maxwell { .. } | Law::BoucWen(_) => 1,
-            Law::BaberWen { .. } => 2,
-        }
-    }
-
     /// The memory's rate of change at this velocity.
     #[inline]
     pub fn rate(&self, velocity: f64, memory: &Memory) -> Memory {
