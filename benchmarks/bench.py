@@ -22,6 +22,10 @@ import scipy
 import scipy.fft
 
 import rthstrack
+from rthstrack import evaluate
+from rthstrack.errors import UnstableError
+from rthstrack.ground_motion import list_records, record
+from rthstrack.simulate import Actuator, BoucWen, Spring, Structure, VirtualTest, simulate_many
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -66,11 +70,33 @@ def medians_us(calls: list[Callable[[], Any]], rounds: int) -> list[float]:
     return [statistics.median(found) for found in times]
 
 
-def rust_bench() -> dict[str, Any]:
-    """One run of crates/core/benches/evaluate.rs."""
-    command = ["cargo", "bench", "--quiet", "--package", "rthstrack", "--bench", "evaluate"]
+def rust_bench(name: str) -> dict[str, Any]:
+    """One run of crates/core/benches/<name>.rs."""
+    command = ["cargo", "bench", "--quiet", "--package", "rthstrack", "--bench", name]
     out = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
     return json.loads(out.splitlines()[-1])
+
+
+def suite() -> dict[int, float]:
+    """Seconds of 44 records x 2 structures x 10 delays, simulated and evaluated, by number of cores."""
+    k = 11.765e6
+    sound, motions = [], [record(r.number, r.component, r.set) for r in list_records("farfield")]
+    for frequency, law, shortest in ((5.0, Spring(), 1e-4), (1.0, BoucWen(k), 5e-4)):
+        structure = Structure.sdof(frequency, 0.02, k / (2 * np.pi * frequency) ** 2)
+        for i in range(1, 11):
+            sound.append(VirtualTest(structure, (Actuator((law,), gain=1.1, delay_s=i * shortest),)))
+    cases = [(test, motion) for motion in motions for test in sound]
+    seconds: dict[int, list[float]] = {1: [], 2: []}
+    for _ in range(2):
+        for n_workers, found in seconds.items():
+            start = time.perf_counter()
+            judged = list(
+                simulate_many(cases, lambda run: evaluate(run.target, run.measured, RATE_HZ), n_workers=n_workers)
+            )
+            found.append(time.perf_counter() - start)
+            if len(judged) != 880 or any(isinstance(j, UnstableError) for j in judged):
+                raise SystemExit("bench: the suite did not run as planned")
+    return {n_workers: min(found) for n_workers, found in seconds.items()}
 
 
 def median_of(turns: list[Any]) -> Any:
@@ -110,13 +136,15 @@ def machine() -> str:
 
 def main() -> int:
     """Measures, prints, writes docs/benchmarks.md; returns 0 whether or not every figure is met."""
+    suite_s = suite()
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     lengths = [24577, 51160, 92161]
-    rust_turns, python_turns = [], []
+    rust_turns, step_turns, python_turns = [], [], []
     for turn in range(TURNS):
         print(f"turn {turn + 1} of {TURNS}", file=sys.stderr)
-        rust_turns.append(rust_bench())
+        rust_turns.append(rust_bench("evaluate"))
+        step_turns.append(rust_bench("simulate"))
         row = []
         for n in lengths:
             target, measured = pair(n)
@@ -192,6 +220,25 @@ def main() -> int:
     )
     hann = found["moving_hann_ms"]
     figures.append(("the same with a Hann window, ms (not asked for)", "", f"{hann:.1f}", True))
+    step_ns = median_of(step_turns)
+    for what, name, most in (
+        ("`continuous`, Bouc-Wen SDOF with delay, ns an internal step", "continuous_bouc_wen_sdof", 100.0),
+        ("the same, linear, ns (not asked for)", "continuous_linear_sdof", None),
+        ("`cr`, one degree of freedom, ns a step", "cr_linear_sdof", 100.0),
+        ("the same, Bouc-Wen with delay, ns (not asked for)", "cr_bouc_wen_sdof_delay", None),
+        ("`cr`, ten degrees of freedom, ns a step", "cr_ten_storeys", 1000.0),
+    ):
+        value = step_ns[name]
+        figures.append((what, f"<= {most:g}" if most else "", f"{value:.0f}", most is None or value <= most))
+    gain = suite_s[1] / suite_s[2]
+    figures.append(
+        (
+            f"44 records x 2 structures x 10 delays on two cores over one ({suite_s[1]:.1f} s)",
+            ">= 1.8",
+            f"{gain:.2f}",
+            gain >= 1.8,
+        )
+    )
     lines += [
         "## Figures asked for",
         "",

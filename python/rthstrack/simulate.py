@@ -2,15 +2,17 @@
 
     M x'' + C x' + K x + sum of restoring forces = -M i a_g        (relative to the ground; SI units)
 
-`VirtualTest` says what is tested, `simulate` runs it under a ground motion, `critical_delay` says which delay its loop bears.
+`VirtualTest` says what is tested, `simulate` runs it under a ground motion, `critical_delay` says which delay it bears.
 Degrees of freedom are numbered from 1; 0 is the ground. delay > 0: measured lags.
 """
 
 from __future__ import annotations
 
 import math
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -18,14 +20,16 @@ from rthstrack import _core
 from rthstrack.errors import ConfigurationError, SettingError, UnstableError
 
 if TYPE_CHECKING:
-    import os
-    from collections.abc import Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
     from rthstrack.ground_motion import GroundMotion
 
     Floats = NDArray[np.float64]
+
+
+Result = TypeVar("Result")
 
 
 class Mistake(NamedTuple):
@@ -124,7 +128,7 @@ class Structure:
     """The whole structure, elastic: mass, damping, stiffness (n, n), `influence` (n,) of the ground motion.
 
     What a specimen or a restoring element with `part_of_structure` brings is subtracted from it by the virtual test.
-    Made by `sdof`, `shear_building` or `from_matrices`; `description` is the table of a configuration that makes it anew.
+    Made by `sdof`, `shear_building` or `from_matrices`; `description` is the configuration's table that makes it anew.
     """
 
     mass_kg: NDArray[np.float64]
@@ -138,7 +142,7 @@ class Structure:
     def sdof(cls, frequency_hz: float, damping_ratio: float, mass_kg: float = 1000.0) -> Structure:
         """One degree of freedom: k = m (2 pi f)^2, c = 2 zeta m (2 pi f). Raises ConfigurationError."""
         found = _core.sdof(float(frequency_hz), float(damping_ratio), float(mass_kg))
-        table = {"frequency_hz": frequency_hz, "damping_ratio": damping_ratio, "mass_kg": mass_kg}
+        table: dict[str, object] = {"frequency_hz": frequency_hz, "damping_ratio": damping_ratio, "mass_kg": mass_kg}
         return cls._built(found, np.ones(1), table)
 
     @classmethod
@@ -251,7 +255,7 @@ class InverseCompensation:
 
 @dataclass(frozen=True, slots=True)
 class PolynomialExtrapolation:
-    """The polynomial through the last order + 1 targets, `delay_s` apart, read `delay_s` ahead (Horiuchi et al. 1999)."""
+    """The polynomial through order + 1 past targets, `delay_s` apart, read `delay_s` ahead (Horiuchi et al. 1999)."""
 
     order: Literal[1, 2, 3]
     delay_s: float
@@ -261,7 +265,7 @@ class PolynomialExtrapolation:
 class Converter:
     """A channel's way between computer and rig: white noise of this two-sided density, then limit, then quantum.
 
-    Units are the channel's own: m for displacements, N for forces. The noise's standard deviation is sqrt(density rate).
+    Units are the channel's own: m for displacements, N for forces. Standard deviation of the noise: sqrt(density rate).
     """
 
     noise_density: float = 0.0
@@ -310,14 +314,12 @@ class VirtualTest:
         mistakes = [Mistake(*m) for m in _core.check_test(self)]
         for i, actuator in enumerate(self.actuators, 1):
             for name in _CONVERTERS:
-                density = getattr(actuator, name).noise_density
+                density, key = getattr(actuator, name).noise_density, f"actuator[{i}].{name}.noise_density"
                 if not (math.isfinite(density) and density >= 0):
-                    mistakes.append(
-                        Mistake(f"actuator[{i}].{name}.noise_density", f"expected a number of at least 0, found {density}")
-                    )
+                    mistakes.append(Mistake(key, f"expected a number of at least 0, found {density}"))
                 elif density and self.stepping == "continuous" and name != "displacement_sensor":
                     what = "expected 0 with test.stepping = 'continuous', whose loop is not sampled"
-                    mistakes.append(Mistake(f"actuator[{i}].{name}.noise_density", f"{what}, found {density}"))
+                    mistakes.append(Mistake(key, f"{what}, found {density}"))
         if self.seed < 0:
             mistakes.append(Mistake("test.seed", f"expected a whole number of at least 0, found {self.seed}"))
         return tuple(mistakes)
@@ -325,7 +327,7 @@ class VirtualTest:
 
 @dataclass(frozen=True, slots=True)
 class CriticalDelay:
-    """The constant delay at which the loop's first pair of roots reaches the imaginary axis, and the frequency where it does.
+    """The constant delay at which the loop's first pair of roots reaches the imaginary axis, and its frequency there.
 
     `delay_s` 0: unstable even without a delay; infinite: no delay makes it unstable. `exact` False: of the elastic
     stiffness of a structure or specimen that yields.
@@ -341,7 +343,8 @@ class CriticalDelay:
 class DelayDamping:
     """What a delay does to each mode: damping ratios with and without it, and the first-order estimate.
 
-    ratio_change is about -(K k_e / k) omega tau / 2 of each mode. Arrays (n_modes,).
+    `first_order_change` is -(K k_e / k) omega tau / 2 with k_e the real part of the specimen's dynamic stiffness at the
+    mode's frequency (its mass takes omega^2 m_e from it). Arrays (n_modes,).
     """
 
     frequency_hz: NDArray[np.float64]
@@ -388,11 +391,11 @@ def simulate(
     round(duration_s rate) + 1 samples, by default as long as the record. `seed` is `test.seed` unless given.
     Raises ConfigurationError with every mistake, UnstableError with the time at which a displacement left its bound.
     """
-    _demand(test)
+    plan = _plan(test)
     ground = ground_motion.resampled(test.rate_hz, duration_s)
     acceleration = np.ascontiguousarray(ground.acceleration_m_s2)
-    signals, left = _core.VirtualTest(test).run(acceleration, _noise(test, len(acceleration), seed))
-    critical = _critical(test)
+    signals, left = plan.run(acceleration, _noise(test, len(acceleration), seed))
+    critical = CriticalDelay(*plan.critical_delay()) if len(test.actuators) == 1 else None
     if signals is None:
         time_s, bound_m = left or (math.nan, math.nan)
         raise UnstableError(
@@ -419,15 +422,32 @@ def simulate(
     )
 
 
+def simulate_many(
+    cases: Iterable[tuple[VirtualTest, GroundMotion]], judge: Callable[[Run], Result], *, n_workers: int | None = None
+) -> Iterator[Result | UnstableError]:
+    """Runs many tests on all cores; yields what `judge` makes of each run, in order, and keeps no run itself.
+
+    An unstable test yields its UnstableError. `n_workers` is the number of processors unless given.
+    """
+
+    def one(case: tuple[VirtualTest, GroundMotion]) -> Result | UnstableError:
+        try:
+            return judge(simulate(*case))
+        except UnstableError as error:
+            return error
+
+    with ThreadPoolExecutor(n_workers or os.cpu_count()) as pool:
+        yield from pool.map(one, cases)
+
+
 def critical_delay(test: VirtualTest) -> CriticalDelay:
     """The constant delay that the loop of the only actuator bears, with its gain, without compensation or dynamics.
 
-    Exact for linear systems: 1 + K k_e(s) g(s) e^(-s tau) = 0 first has a root on the imaginary axis. For small damping and
-    a specimen that is all of an SDOF's stiffness it is about 2 zeta / omega.
+    Exact for linear systems: 1 + K k_e(s) g(s) e^(-s tau) = 0 first has a root on the imaginary axis. For small damping
+    and a specimen that is all of an SDOF's stiffness it is about 2 zeta / omega.
     Raises ConfigurationError, also with several actuators.
     """
-    _demand(test)
-    return CriticalDelay(*_core.VirtualTest(test).critical_delay())
+    return CriticalDelay(*_plan(test).critical_delay())
 
 
 def delay_damping(test: VirtualTest, delay_s: float) -> DelayDamping:
@@ -436,8 +456,7 @@ def delay_damping(test: VirtualTest, delay_s: float) -> DelayDamping:
     The roots of the delayed characteristic equation, and the first-order estimate -(K k_e / k) omega tau / 2.
     Raises ConfigurationError, also with several actuators.
     """
-    _demand(test)
-    return DelayDamping(*_core.VirtualTest(test).delay_damping(float(delay_s)))
+    return DelayDamping(*_plan(test).delay_damping(float(delay_s)))
 
 
 def true_tracking(
@@ -448,7 +467,7 @@ def true_tracking(
     From compensation, gain, delay and dynamics; None where they are no one linear filter (a delay that varies, a
     servo-hydraulic plant with a specimen that yields). The phase is unwrapped from zero frequency.
     """
-    _demand(test)
+    plan = _plan(test)
     frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
     model = test.actuators[actuator]
     # Unwrapped along a grid that is fine for every delay in play.
@@ -456,7 +475,7 @@ def true_tracking(
     grid = np.linspace(0.0, top, max(2, math.ceil(64 * top) + 1))
     everywhere = np.concatenate((grid, frequency.ravel()))
     order = np.argsort(everywhere, kind="stable")
-    response = _core.VirtualTest(test).true_response(actuator, np.ascontiguousarray(everywhere[order]))
+    response = plan.true_response(actuator, np.ascontiguousarray(everywhere[order]))
     if response is None:
         return None
     line = float(model.delay_s) if not isinstance(model.delay_s, DelayHistory) else 0.0
@@ -473,14 +492,11 @@ def true_tracking(
 _CONVERTERS = ("command_converter", "displacement_sensor", "force_sensor")
 
 
-def _demand(test: VirtualTest) -> None:
+def _plan(test: VirtualTest) -> _core.VirtualTest:
     mistakes = test.check()
     if mistakes:
         raise ConfigurationError("", [(m.key, m.message) for m in mistakes])
-
-
-def _critical(test: VirtualTest) -> CriticalDelay | None:
-    return critical_delay(test) if len(test.actuators) == 1 else None
+    return _core.VirtualTest(test)
 
 
 def _noise(test: VirtualTest, n_samples: int, seed: int | None) -> list[list[float] | None]:

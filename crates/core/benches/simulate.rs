@@ -6,7 +6,8 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use rthstrack::dynamics::{
-    Actuator, BoucWen, Compensation, Converter, Damping, Delay, Dynamics, Law, Stepping, Structure, TestConfig, VirtualTest,
+    Actuator, BoucWen, Compensation, Converter, Damping, Delay, Dynamics, Law, Stepping, Structure, TestConfig,
+    VirtualTest,
 };
 
 const RATE_HZ: f64 = 1024.0;
@@ -61,7 +62,8 @@ fn main() {
         let omega = 2.0 * std::f64::consts::PI * frequency;
         Structure::sdof(frequency, 0.02, k / (omega * omega)).expect("a sound structure")
     };
-    let storeys = Structure::shear_building(&[1e4; 10], &[2e7; 10], &Damping::Modal(vec![0.02])).expect("a sound building");
+    let storeys =
+        Structure::shear_building(&[1e4; 10], &[2e7; 10], &Damping::Modal(vec![0.02])).expect("a sound building");
     let spring = Law::Spring { stiffness: k };
     let cases = [
         ("continuous_bouc_wen_sdof", test(sdof(1.0), actuator(bouc_wen(k), 1.1, 0.005), Stepping::Continuous)),

@@ -5,8 +5,8 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use rthstrack::Error;
 use rthstrack::dynamics::{
-    Actuator, BoucWen, Compensation, Converter, Damping, Delay, Dynamics, Element, Law, Mistake, ServoHydraulic, Stepping,
-    Structure, TestConfig,
+    Actuator, BoucWen, Compensation, Converter, Damping, Delay, Dynamics, Element, Law, Mistake, ServoHydraulic,
+    Stepping, Structure, TestConfig,
 };
 
 use crate::error::{choice, to_py};
@@ -41,9 +41,8 @@ fn unknown(what: &str, name: &str) -> PyErr {
 /// A law; `whole` is the stiffness meant by None.
 fn law(object: &Bound<'_, PyAny>, whole: f64) -> PyResult<Law> {
     let name = kind(object)?;
-    let stiffness = || -> PyResult<f64> {
-        Ok(object.getattr("stiffness_n_per_m")?.extract::<Option<f64>>()?.unwrap_or(whole))
-    };
+    let stiffness =
+        || -> PyResult<f64> { Ok(object.getattr("stiffness_n_per_m")?.extract::<Option<f64>>()?.unwrap_or(whole)) };
     let damping = || number(object, "damping_n_s_per_m");
     let hysteresis = || -> PyResult<BoucWen> {
         Ok(BoucWen {
@@ -168,9 +167,10 @@ fn damping(object: &Bound<'_, PyAny>) -> PyResult<Damping> {
                 Err(_) => ratios.extract()?,
             })
         }
-        "RayleighDamping" => {
-            Damping::Rayleigh { ratios: object.getattr("ratios")?.extract()?, modes: object.getattr("modes")?.extract()? }
-        }
+        "RayleighDamping" => Damping::Rayleigh {
+            ratios: object.getattr("ratios")?.extract()?,
+            modes: object.getattr("modes")?.extract()?,
+        },
         _ => Damping::Matrix(object.extract::<PyReadonlyArray2<'_, f64>>()?.as_slice().map_err(contiguous)?.to_vec()),
     })
 }
@@ -179,18 +179,27 @@ fn contiguous(_: impl std::fmt::Debug) -> PyErr {
     PyValueError::new_err("the array must be C-contiguous")
 }
 
-fn built<'py>(py: Python<'py>, structure: Result<Structure, Vec<Mistake>>) -> PyResult<(Option<Matrices<'py>>, Mistakes)> {
+fn built<'py>(
+    py: Python<'py>,
+    structure: Result<Structure, Vec<Mistake>>,
+) -> PyResult<(Option<Matrices<'py>>, Mistakes)> {
     let structure = match structure {
         Ok(structure) => structure,
         Err(mistakes) => return Ok((None, pairs(&mistakes))),
     };
     let n = structure.n_dof();
-    let [m, c, k] = structure.matrices().map(|rows| Array2::from_shape_vec((n, n), rows).expect("n x n").into_pyarray(py));
+    let [m, c, k] =
+        structure.matrices().map(|rows| Array2::from_shape_vec((n, n), rows).expect("n x n").into_pyarray(py));
     Ok((Some((m, c, k, structure.natural_frequencies_hz().to_vec().into_pyarray(py))), Vec::new()))
 }
 
 #[pyfunction]
-fn sdof(py: Python<'_>, frequency_hz: f64, damping_ratio: f64, mass_kg: f64) -> PyResult<(Option<Matrices<'_>>, Mistakes)> {
+fn sdof(
+    py: Python<'_>,
+    frequency_hz: f64,
+    damping_ratio: f64,
+    mass_kg: f64,
+) -> PyResult<(Option<Matrices<'_>>, Mistakes)> {
     built(py, Structure::sdof(frequency_hz, damping_ratio, mass_kg))
 }
 
@@ -231,7 +240,11 @@ fn configuration(py: Python<'_>, test: &Bound<'_, PyAny>) -> PyResult<TestConfig
         .map_err(|mistakes| to_py(py, &Error::Configuration(mistakes)))?;
     Ok(TestConfig {
         elements: test.getattr("elements")?.try_iter()?.map(|e| element(&e?, &structure)).collect::<PyResult<_>>()?,
-        actuators: test.getattr("actuators")?.try_iter()?.map(|a| actuator(&a?, &structure)).collect::<PyResult<_>>()?,
+        actuators: test
+            .getattr("actuators")?
+            .try_iter()?
+            .map(|a| actuator(&a?, &structure))
+            .collect::<PyResult<_>>()?,
         structure,
         stepping: choice(py, "stepping", &Stepping::NAMES, &test.getattr("stepping")?.extract::<String>()?)?,
         rate_hz: number(test, "rate_hz")?,
@@ -277,6 +290,9 @@ type Signals<'py> = (
     f64,
 );
 
+/// The signals, or when and at which bound the test became unstable.
+type Outcome<'py> = (Option<Signals<'py>>, Option<(f64, f64)>);
+
 #[pymethods]
 impl VirtualTest {
     #[new]
@@ -292,7 +308,7 @@ impl VirtualTest {
         py: Python<'py>,
         ground: PyReadonlyArray1<'py, f64>,
         noise: Vec<Option<Vec<f64>>>,
-    ) -> PyResult<(Option<Signals<'py>>, Option<(f64, f64)>)> {
+    ) -> PyResult<Outcome<'py>> {
         let ground = ground.as_slice()?;
         let run = match py.detach(|| self.plan.run(ground, &noise)) {
             Ok(run) => run,

@@ -6,6 +6,7 @@ use pyo3::types::PyType;
 use rthstrack::Error;
 
 static SIGNAL_ERROR: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+static CONFIGURATION_ERROR: PyOnceLock<Py<PyType>> = PyOnceLock::new();
 static SETTING_ERROR: PyOnceLock<Py<PyType>> = PyOnceLock::new();
 
 /// `SignalError` for what is wrong with the samples, `SettingError` for what is wrong with the settings.
@@ -19,6 +20,11 @@ pub(crate) fn of_actuator(py: Python<'_>, actuator: usize, error: &Error) -> PyE
 }
 
 fn with_message(py: Python<'_>, error: &Error, message: String) -> PyErr {
+    if let Error::Configuration(mistakes) = error {
+        let pairs: Vec<(String, String)> = mistakes.iter().map(|m| (m.key.clone(), m.message.clone())).collect();
+        let class = CONFIGURATION_ERROR.import(py, "rthstrack.errors", "ConfigurationError");
+        return class.map_or_else(|e| e, |class| PyErr::from_type(class.clone(), ("", pairs)));
+    }
     let class = match error {
         Error::Length { .. }
         | Error::TooShort { .. }

@@ -65,8 +65,13 @@ impl Delay {
                 for delay in delay_s {
                     nonnegative(checks, "delay_s.delay_s", *delay);
                 }
-                let falls = time_s.windows(2).zip(delay_s.windows(2)).any(|(t, d)| d[1] - d[0] >= t[1] - t[0]);
-                checks.demand("delay_s.delay_s", !falls, "delays that grow by less than time does", "a faster growth (the past would repeat)");
+                let repeats = time_s.windows(2).zip(delay_s.windows(2)).any(|(t, d)| d[1] - d[0] >= t[1] - t[0]);
+                checks.demand(
+                    "delay_s.delay_s",
+                    !(rising && repeats),
+                    "delays that grow by less than time does",
+                    "a faster growth (the past would repeat)",
+                );
             }
         }
     }
@@ -213,8 +218,9 @@ impl Actuator {
 
     pub(crate) fn check(&self, checks: &mut Checks, sampled: bool, rate_hz: f64) {
         checks.demand("specimen", !self.specimen.is_empty(), "at least one restoring force", "none");
-        for law in &self.specimen {
-            checks.under("specimen", |c| law.check(c));
+        for (i, law) in self.specimen.iter().enumerate() {
+            let key = if self.specimen.len() == 1 { "specimen".into() } else { format!("specimen[{}]", i + 1) };
+            checks.under(&key, |c| law.check(c));
         }
         nonnegative(checks, "specimen_mass_kg", self.specimen_mass);
         checks.demand("gain", self.gain.is_finite() && self.gain != 0.0, "a finite number other than 0", self.gain);
@@ -226,7 +232,10 @@ impl Actuator {
         if !sampled {
             let only = |checks: &mut Checks, key: &str, ideal: bool, what: &str| {
                 if !ideal {
-                    checks.mistake(key, format!("{what} works once a sample: expected test.stepping = \"cr\", found \"continuous\""));
+                    checks.mistake(
+                        key,
+                        format!("{what} works once a sample: expected test.stepping = \"cr\", found \"continuous\""),
+                    );
                 }
             };
             only(checks, "compensation", self.compensation == Compensation::None, "compensation");
@@ -235,7 +244,12 @@ impl Actuator {
             only(checks, "force_sensor", self.force_sensor.is_ideal(), "a force sensor in the loop");
             only(checks, "force_delay_samples", self.force_delay_samples == 0, "a force that is late by samples");
         }
-        checks.demand("force_delay_samples", self.force_delay_samples <= 4096, "at most 4096", self.force_delay_samples);
+        checks.demand(
+            "force_delay_samples",
+            self.force_delay_samples <= 4096,
+            "at most 4096",
+            self.force_delay_samples,
+        );
         checks.under("dynamics", |checks| match &self.dynamics {
             Dynamics::None => {}
             Dynamics::FirstOrder { alpha } => {
@@ -246,14 +260,27 @@ impl Actuator {
                 checks.demand("denominator", finite, "finite coefficients", "NaN or infinity");
                 let leads = denominator.first().is_some_and(|v| *v != 0.0);
                 checks.demand("denominator", leads, "a first coefficient other than 0", format!("{denominator:?}"));
-                checks.demand("denominator", denominator.len() <= MAX_ORDER + 1, "an order of at most 16", denominator.len().saturating_sub(1));
+                checks.demand(
+                    "denominator",
+                    denominator.len() <= MAX_ORDER + 1,
+                    "an order of at most 16",
+                    denominator.len().saturating_sub(1),
+                );
                 let proper = !numerator.is_empty() && numerator.len() <= denominator.len();
-                checks.demand("numerator", proper, "as many coefficients as the denominator's, or fewer", numerator.len());
+                checks.demand(
+                    "numerator",
+                    proper,
+                    "as many coefficients as the denominator's, or fewer",
+                    numerator.len(),
+                );
                 if finite && leads && proper && denominator.len() <= MAX_ORDER + 1 {
                     let poles = StateSpace::of(numerator, denominator).poles();
                     let unstable = poles.iter().find(|p| p.re >= 0.0);
                     if let Some(pole) = unstable {
-                        checks.mistake("denominator", format!("expected poles left of the imaginary axis, found {pole} rad/s"));
+                        checks.mistake(
+                            "denominator",
+                            format!("expected poles left of the imaginary axis, found {pole} rad/s"),
+                        );
                     }
                 }
             }
@@ -289,14 +316,16 @@ impl Actuator {
                     })
                     .collect();
                 let n = 5 + relaxing.len();
-                let mut system = StateSpace { a: DMatrix::zeros(n, n), b: DVector::zeros(n), c: DVector::zeros(n), d: 0.0 };
+                let mut system =
+                    StateSpace { a: DMatrix::zeros(n, n), b: DVector::zeros(n), c: DVector::zeros(n), d: 0.0 };
                 let a = &mut system.a;
                 let (k, c) = (self.elastic_stiffness(), self.viscous_damping());
                 a[(0, 1)] = 1.0;
                 (a[(1, 0)], a[(1, 1)], a[(1, 3)]) = (-servo.b2, -servo.b1, -servo.a1b0);
                 (a[(2, 0)], a[(2, 2)], a[(2, 4)]) = (1.0, -servo.a3, -servo.a2);
                 a[(3, 4)] = 1.0;
-                (a[(4, 2)], a[(4, 3)], a[(4, 4)]) = (1.0 / self.specimen_mass, -k / self.specimen_mass, -c / self.specimen_mass);
+                (a[(4, 2)], a[(4, 3)], a[(4, 4)]) =
+                    (1.0 / self.specimen_mass, -k / self.specimen_mass, -c / self.specimen_mass);
                 for (i, (stiffness, damping)) in relaxing.into_iter().enumerate() {
                     a[(4, 5 + i)] = -1.0 / self.specimen_mass;
                     a[(5 + i, 4)] = stiffness;
@@ -381,7 +410,13 @@ impl StateSpace {
 }
 
 /// C (z I - A)^-1 B + D.
-pub(crate) fn solve_response(a: &DMatrix<f64>, b: &DVector<f64>, c: &DVector<f64>, d: f64, z: Complex<f64>) -> Complex<f64> {
+pub(crate) fn solve_response(
+    a: &DMatrix<f64>,
+    b: &DVector<f64>,
+    c: &DVector<f64>,
+    d: f64,
+    z: Complex<f64>,
+) -> Complex<f64> {
     let n = b.len();
     if n == 0 {
         return Complex::new(d, 0.0);
@@ -455,7 +490,11 @@ impl SampledActuator {
         crate::pair::check_rate(rate_hz)?;
         let mut checks = Checks::default();
         checks.under("actuator[1]", |c| actuator.check(c, true, rate_hz));
-        if checks.mistakes.is_empty() { Ok(Self::planned(actuator, rate_hz)) } else { Err(crate::Error::Configuration(checks.mistakes)) }
+        if checks.mistakes.is_empty() {
+            Ok(Self::planned(actuator, rate_hz))
+        } else {
+            Err(crate::Error::Configuration(checks.mistakes))
+        }
     }
 
     /// At rest.
@@ -506,16 +545,27 @@ impl SampledActuator {
         (motion, force)
     }
 
-    fn linear(&self, state: &mut SampledActuatorState, system: &StateSpace, held: &(Vec<f64>, Vec<f64>), input: Motion) -> Motion {
+    fn linear(
+        &self,
+        state: &mut SampledActuatorState,
+        system: &StateSpace,
+        held: &(Vec<f64>, Vec<f64>),
+        input: Motion,
+    ) -> Motion {
         let n = system.order();
         for i in 0..n {
             let row = &held.0[i * n..(i + 1) * n];
-            state.scratch[i] = held.1[i] * state.input + row.iter().zip(&state.dynamics).map(|(a, w)| a * w).sum::<f64>();
+            state.scratch[i] =
+                held.1[i] * state.input + row.iter().zip(&state.dynamics).map(|(a, w)| a * w).sum::<f64>();
         }
         state.dynamics.copy_from_slice(&state.scratch[..n]);
         state.input = input.displacement;
         let w = &state.dynamics;
-        let mut motion = Motion { displacement: system.d * input.displacement, velocity: system.d * input.velocity, acceleration: 0.0 };
+        let mut motion = Motion {
+            displacement: system.d * input.displacement,
+            velocity: system.d * input.velocity,
+            acceleration: 0.0,
+        };
         for i in 0..n {
             let rate = system.b[i] * input.displacement + (0..n).map(|j| system.a[(i, j)] * w[j]).sum::<f64>();
             motion.displacement += system.c[i] * w[i];
@@ -524,7 +574,13 @@ impl SampledActuator {
         motion
     }
 
-    fn servo(&self, state: &mut SampledActuatorState, servo: &ServoHydraulic, n_steps: usize, input: Motion) -> (Motion, f64) {
+    fn servo(
+        &self,
+        state: &mut SampledActuatorState,
+        servo: &ServoHydraulic,
+        n_steps: usize,
+        input: Motion,
+    ) -> (Motion, f64) {
         let (actuator, h) = (&self.actuator, 1.0 / self.rate_hz / n_steps as f64);
         let n = state.dynamics.len();
         let held = std::mem::replace(&mut state.input, input.displacement);
@@ -557,7 +613,13 @@ impl SampledActuator {
             Kind::FirstOrder(alpha) => z / (z * *alpha - (alpha - 1.0)),
             Kind::Linear { system, held } => {
                 let n = system.order();
-                solve_response(&DMatrix::from_row_slice(n, n, &held.0), &DVector::from_column_slice(&held.1), &system.c, system.d, z)
+                solve_response(
+                    &DMatrix::from_row_slice(n, n, &held.0),
+                    &DVector::from_column_slice(&held.1),
+                    &system.c,
+                    system.d,
+                    z,
+                )
             }
             Kind::Servo { .. } => {
                 let system = self.actuator.linear_dynamics(false)?;

@@ -60,7 +60,12 @@ impl Compensation {
             Compensation::Extrapolation { order, delay_s } => {
                 checks.demand("order", (1..=3).contains(order), "1, 2 or 3", order);
                 positive(checks, "delay_s", *delay_s);
-                checks.demand("delay_s", !(delay_s * rate_hz > 1e6), "at most a million samples", delay_s);
+                checks.demand(
+                    "delay_s",
+                    delay_s * rate_hz <= 1e6 || !delay_s.is_finite(),
+                    "at most a million samples",
+                    delay_s,
+                );
             }
         }
     }

@@ -60,7 +60,8 @@ pub(crate) fn run(test: &VirtualTest, ground: &[f64], noise: &Noise, bound: f64)
 fn first_steps(test: &VirtualTest) -> Result<usize> {
     let dt = 1.0 / test.config.rate_hz;
     let mut rate = test.natural_frequencies().last().copied().unwrap_or(0.0);
-    let laws = test.config.actuators.iter().flat_map(|a| &a.specimen).chain(test.config.elements.iter().map(|e| &e.law));
+    let laws =
+        test.config.actuators.iter().flat_map(|a| &a.specimen).chain(test.config.elements.iter().map(|e| &e.law));
     rate = laws.map(Law::relaxation_rate).fold(rate, f64::max);
     for actuator in &test.config.actuators {
         let poles = actuator.linear_dynamics(true).map(|s| s.poles()).unwrap_or_default();
@@ -74,7 +75,11 @@ fn first_steps(test: &VirtualTest) -> Result<usize> {
         }
     }
     if steps > MAX_STEPS {
-        let message = format!("expected at least {:.0} Hz for the fastest mode, pole or relaxation, found {}", rate / PACE / MAX_STEPS, test.config.rate_hz);
+        let message = format!(
+            "expected at least {:.0} Hz for the fastest mode, pole or relaxation, found {}",
+            rate / PACE / MAX_STEPS,
+            test.config.rate_hz
+        );
         return Err(configuration("test.rate_hz", &message));
     }
     Ok(steps as usize)
@@ -155,7 +160,12 @@ impl<'a> Equations<'a> {
             let servo = matches!(actuator.dynamics, Dynamics::ServoHydraulic(_));
             let through = if servo { 0.0 } else { system.as_ref().map_or(1.0, |s| s.d) };
             if actuator.delay == Delay::Constant(0.0) {
-                add_across(&mut mass, actuator.dof, actuator.from_dof, actuator.gain * through * actuator.specimen_mass);
+                add_across(
+                    &mut mass,
+                    actuator.dof,
+                    actuator.from_dof,
+                    actuator.gain * through * actuator.specimen_mass,
+                );
             }
             let dynamics = len;
             len += if servo { 5 + 2 * actuator.specimen.len() } else { system.as_ref().map_or(0, StateSpace::order) };
@@ -185,7 +195,8 @@ impl<'a> Equations<'a> {
         len += 2 * test.config.elements.len();
         let some = |matrix: &DMatrix<f64>| (matrix.amax() > 0.0).then(|| rows(matrix));
         let inverse = mass.try_inverse().filter(|m| m.iter().all(|v| v.is_finite()));
-        let inverse = rows(&inverse.ok_or_else(|| configuration("structure.mass_kg", "expected a matrix that can be inverted"))?);
+        let inverse =
+            rows(&inverse.ok_or_else(|| configuration("structure.mass_kg", "expected a matrix that can be inverted"))?);
         let (damping, stiffness) = (some(&test.numerical.damping), some(&test.numerical.stiffness));
         Ok(Self { test, n, inverse, damping, stiffness, rigs, elements, force: vec![0.0; n], len })
     }
@@ -288,8 +299,10 @@ impl<'a> Equations<'a> {
             rig.seen = Seen { target, measured: motion, force };
             across_add(&mut self.force, actuator.dof, actuator.from_dof, -force);
         }
-        for i in 0..n {
-            out[i] = v[i];
+        if N == 1 {
+            out[0] = v[0];
+        } else {
+            out[..n].copy_from_slice(v);
         }
         super::sampled::multiply(&self.inverse[..n * n], &self.force[..n], &mut out[n..2 * n]);
     }
@@ -347,7 +360,8 @@ fn stepped<const N: usize>(test: &VirtualTest, ground: &[f64], bound: f64, steps
     let mut equations = Equations::new(test, h)?;
     let n = equations.n;
     let blocks = || vec![[0.0; 4]; equations.len.div_ceil(4)];
-    let (mut y, mut ahead, mut total, mut k): (Blocks, Blocks, Blocks, Blocks) = (blocks(), blocks(), blocks(), blocks());
+    let (mut y, mut ahead, mut total, mut k): (Blocks, Blocks, Blocks, Blocks) =
+        (blocks(), blocks(), blocks(), blocks());
     let mut run = Run::sized(equations.rigs.len(), n, ground.len(), steps);
     for sample in 0..ground.len() {
         let from = ground[sample];

@@ -80,13 +80,23 @@ impl BoucWen {
     fn check(&self, checks: &mut Checks) {
         positive(checks, "stiffness_n_per_m", self.stiffness);
         positive(checks, "yield_displacement_m", self.yield_displacement);
-        checks.demand("post_yield_ratio", (0.0..=1.0).contains(&self.post_yield_ratio), "a ratio from 0 to 1", self.post_yield_ratio);
+        checks.demand(
+            "post_yield_ratio",
+            (0.0..=1.0).contains(&self.post_yield_ratio),
+            "a ratio from 0 to 1",
+            self.post_yield_ratio,
+        );
         // z stays within (beta + gamma)^(-1/q); without a positive sum it grows without bound.
         for (key, value) in [("beta", self.beta), ("gamma", self.gamma)] {
             checks.demand(key, value.is_finite(), "a finite number", value);
         }
         let sum = self.beta + self.gamma;
-        checks.demand("gamma", !(sum <= 0.0), "beta + gamma to be positive, or the force has no bound", sum);
+        checks.demand(
+            "gamma",
+            sum > 0.0 || !sum.is_finite(),
+            "beta + gamma to be positive, or the force has no bound",
+            sum,
+        );
         checks.demand("exponent", (0.5..=64.0).contains(&self.exponent), "a number from 0.5 to 64", self.exponent);
     }
 }
@@ -127,7 +137,9 @@ impl Law {
         let pace = match self {
             Law::Spring { .. } | Law::Dashpot { .. } | Law::KelvinVoigt { .. } => return,
             Law::Maxwell { stiffness, damping } => 2.0 * dt * stiffness / damping,
-            Law::BoucWen(law) | Law::BaberWen { hysteresis: law, .. } => 10.0 * (to - from).abs() / law.yield_displacement,
+            Law::BoucWen(law) | Law::BaberWen { hysteresis: law, .. } => {
+                10.0 * (to - from).abs() / law.yield_displacement
+            }
         };
         // A motion without end is stopped by the test's bound, not here.
         let n_steps = if pace < 1.0 { 1.0 } else { pace.ceil().min(1e4) };

@@ -132,7 +132,11 @@ pub(crate) fn run(test: &VirtualTest, ground: &[f64], noise: &Noise, bound: f64)
             run.command[i][sample] = sent;
             run.measured[i][sample] = rig.measured;
             run.force[i][sample] = felt;
-            let arrived = if rig.late.is_empty() { felt } else { std::mem::replace(&mut rig.late[sample % actuator.force_delay_samples], felt) };
+            let arrived = if rig.late.is_empty() {
+                felt
+            } else {
+                std::mem::replace(&mut rig.late[sample % actuator.force_delay_samples], felt)
+            };
             across_add(&mut force, actuator.dof, actuator.from_dof, -arrived);
         }
         multiply(&inverse, &force, &mut a);
@@ -141,7 +145,7 @@ pub(crate) fn run(test: &VirtualTest, ground: &[f64], noise: &Noise, bound: f64)
             run.displacement[i][sample] = x[i];
             within &= x[i].abs() <= bound && a[i].is_finite();
         }
-        if !within || rigs.iter().any(|rig| !(rig.measured.abs() <= bound)) {
+        if !within || !rigs.iter().all(|rig| rig.measured.abs() <= bound) {
             return Err(Error::Unstable { time_s: sample as f64 * dt, bound_m: bound });
         }
     }

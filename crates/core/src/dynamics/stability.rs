@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{Cholesky, Complex, DMatrix, DVector};
 
-use super::actuator::{eigenvalues, solve_response};
+use super::actuator::{StateSpace, eigenvalues};
 use super::law::Law;
 use super::structure::modes;
 use super::virtual_test::{VirtualTest, configuration};
@@ -47,7 +47,8 @@ pub struct DelayDamping {
     pub damping_ratio: Vec<f64>,
     /// The same without delay.
     pub damping_ratio_without: Vec<f64>,
-    /// -(K k_e / k) omega tau / 2, k = omega^2 of unit modal mass.
+    /// -(K k_e / k) omega tau / 2, k = omega^2 of unit modal mass, k_e the real part of the specimen's dynamic stiffness
+    /// at omega: its mass takes omega^2 m_e from it.
     pub first_order_change: Vec<f64>,
 }
 
@@ -105,7 +106,7 @@ impl Loop {
     }
 
     /// A, B, C, D of L: states x, v, the elements' and the specimen's relaxing forces; input the actuator's force.
-    fn open(&self) -> Option<(DMatrix<f64>, DVector<f64>, DVector<f64>, f64)> {
+    fn open(&self) -> Option<StateSpace> {
         let n = self.b.len();
         let (own, all) = (2 * n + self.elements.len(), 2 * n + self.elements.len() + self.relaxing.len());
         let inverse = self.mass.clone().try_inverse()?;
@@ -136,27 +137,26 @@ impl Loop {
         // One scale for input and output, so that the Hamiltonian's blocks are of one size.
         let scale = (out.amax() / b.amax()).sqrt();
         let scale = if scale.is_finite() && scale > 0.0 { scale } else { 1.0 };
-        Some((a, b * (scale * self.gain), out / scale, d * self.gain))
+        Some(StateSpace { a, b: b * (scale * self.gain), c: out / scale, d: d * self.gain })
     }
 
     pub(crate) fn critical_delay(&self) -> Result<CriticalDelay> {
         let found = |delay_s, frequency_hz| CriticalDelay { delay_s, frequency_hz, gain: self.gain, exact: self.exact };
-        let Some((a, b, c, d)) = self.open() else {
+        let Some(open) = self.open() else {
             return Err(configuration("structure.mass_kg", "expected a matrix that can be inverted"));
         };
         // A specimen heavier than what is left of the structure rings at every frequency, however short the delay.
-        if d.abs() >= 1.0 {
+        if open.d.abs() >= 1.0 {
             return Ok(found(0.0, f64::NAN));
         }
-        let closed = &a - &b * c.transpose() / (1.0 + d);
+        let closed = &open.a - &open.b * open.c.transpose() / (1.0 + open.d);
         let slow = |p: &Complex<f64>| p.re > -1e-10 * p.norm().max(1e-12);
         if let Some(root) = eigenvalues(&closed).iter().find(|p| slow(p) && p.im >= 0.0) {
             return Ok(found(0.0, root.im / (2.0 * PI)));
         }
-        let response = |omega: f64| solve_response(&a, &b, &c, d, Complex::new(0.0, omega));
         let mut least = found(f64::INFINITY, f64::NAN);
-        for omega in crossings(&a, &b, &c, d) {
-            let mut angle = (response(omega).arg() + PI).rem_euclid(2.0 * PI);
+        for omega in crossings(&open) {
+            let mut angle = (open.response(Complex::new(0.0, omega)).arg() + PI).rem_euclid(2.0 * PI);
             if angle > 2.0 * PI - ANGLE {
                 angle = 0.0;
             }
@@ -224,7 +224,8 @@ impl Loop {
         let outer = &self.b * self.b.transpose();
         let mass = &self.mass + &outer * (self.gain * self.specimen[2]);
         let stiffness = &self.stiffness + outer * (self.gain * self.specimen[0]);
-        let factor = Cholesky::new(mass).ok_or_else(|| configuration("structure.mass_kg", "expected a positive definite matrix"))?;
+        let factor = Cholesky::new(mass)
+            .ok_or_else(|| configuration("structure.mass_kg", "expected a positive definite matrix"))?;
         let (omega, shapes) = modes(&factor, &stiffness);
         let mut found = DelayDamping {
             frequency_hz: Vec::new(),
@@ -241,7 +242,11 @@ impl Loop {
                 sound = sound && self.follow(&mut s, &mut phi, delay_s * step as f64 / CONTINUATION as f64);
             }
             let moved = self.b.dot(&shapes.column(i));
-            found.first_order_change.push(-self.gain * self.specimen[0] * moved * moved * delay_s / (2.0 * omega));
+            let [k, _, m] = self.specimen;
+            let square = omega * omega;
+            let relaxed: f64 = self.relaxing.iter().map(|(k, rate)| k * square / (square + rate * rate)).sum();
+            let stiffness = k - square * m + relaxed;
+            found.first_order_change.push(-self.gain * stiffness * moved * moved * delay_s / (2.0 * omega));
             found.frequency_hz.push(if sound { s.im.abs() / (2.0 * PI) } else { f64::NAN });
             found.damping_ratio.push(if sound { -s.re / s.norm() } else { f64::NAN });
             found.damping_ratio_without.push(if sound { without } else { f64::NAN });
@@ -251,16 +256,17 @@ impl Loop {
 }
 
 /// Every omega > 0 with |C (j omega - A)^-1 B + D| = 1.
-fn crossings(a: &DMatrix<f64>, b: &DVector<f64>, c: &DVector<f64>, d: f64) -> Vec<f64> {
+fn crossings(open: &StateSpace) -> Vec<f64> {
+    let StateSpace { a, b, c, d } = open;
     let n = b.len();
     let r = 1.0 - d * d;
-    let corner = a + b * c.transpose() * (d / r);
+    let corner = a + b * c.transpose() * (*d / r);
     let mut hamiltonian = DMatrix::zeros(2 * n, 2 * n);
     hamiltonian.view_mut((0, 0), (n, n)).copy_from(&corner);
     hamiltonian.view_mut((0, n), (n, n)).copy_from(&(b * b.transpose() / r));
     hamiltonian.view_mut((n, 0), (n, n)).copy_from(&(c * c.transpose() * (-1.0 - d * d / r)));
     hamiltonian.view_mut((n, n), (n, n)).copy_from(&-corner.transpose());
-    let excess = |omega: f64| solve_response(a, b, c, d, Complex::new(0.0, omega)).norm().ln();
+    let excess = |omega: f64| open.response(Complex::new(0.0, omega)).norm().ln();
     let mut found: Vec<f64> = Vec::new();
     for root in eigenvalues(&hamiltonian) {
         if root.im <= 0.0 || root.re.abs() > NEAR * root.norm() {

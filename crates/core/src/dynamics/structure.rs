@@ -44,7 +44,12 @@ impl Structure {
         let mut checks = Checks::default();
         positive(&mut checks, "structure.frequency_hz", frequency_hz);
         positive(&mut checks, "structure.mass_kg", mass_kg);
-        checks.demand("structure.damping_ratio", (0.0..1.0).contains(&damping_ratio), "a ratio from 0 to below 1", damping_ratio);
+        checks.demand(
+            "structure.damping_ratio",
+            (0.0..1.0).contains(&damping_ratio),
+            "a ratio from 0 to below 1",
+            damping_ratio,
+        );
         if !checks.mistakes.is_empty() {
             return Err(checks.mistakes);
         }
@@ -113,7 +118,8 @@ impl Structure {
             Some(matrix)
         };
         let (m, k) = (take("structure.mass_kg", mass), take("structure.stiffness_n_per_m", stiffness));
-        let given = if let Damping::Matrix(values) = damping { take("structure.damping_n_s_per_m", values) } else { None };
+        let given =
+            if let Damping::Matrix(values) = damping { take("structure.damping_n_s_per_m", values) } else { None };
         let influence = influence.map_or_else(|| vec![1.0; n], <[f64]>::to_vec);
         let sound = influence.len() == n && influence.iter().all(|v| v.is_finite());
         checks.demand("structure.influence", sound, &format!("{n} finite numbers"), format!("{influence:?}"));
@@ -121,7 +127,10 @@ impl Structure {
             let factor = Cholesky::new(m.clone());
             if factor.is_none() {
                 let least = lowest(m);
-                checks.mistake("structure.mass_kg", format!("expected a positive definite matrix, found the eigenvalue {least}"));
+                checks.mistake(
+                    "structure.mass_kg",
+                    format!("expected a positive definite matrix, found the eigenvalue {least}"),
+                );
             }
             factor
         });
@@ -144,7 +153,8 @@ impl Structure {
         if let Some(c) = &damping
             && lowest(c) < -ROUNDING * c.amax()
         {
-            let message = format!("expected no negative eigenvalue, found {} (damping that feeds energy in)", lowest(c));
+            let message =
+                format!("expected no negative eigenvalue, found {} (damping that feeds energy in)", lowest(c));
             checks.mistake("structure.damping_n_s_per_m", message);
         }
         match damping {
@@ -206,11 +216,22 @@ pub(crate) fn modes(factor: &Cholesky<f64, nalgebra::Dyn>, stiffness: &DMatrix<f
     (omega, inverse.transpose() * eigen.eigenvectors.select_columns(&order))
 }
 
-fn modal(checks: &mut Checks, mass: &DMatrix<f64>, omega: &[f64], shapes: &DMatrix<f64>, ratios: &[f64]) -> Option<DMatrix<f64>> {
+fn modal(
+    checks: &mut Checks,
+    mass: &DMatrix<f64>,
+    omega: &[f64],
+    shapes: &DMatrix<f64>,
+    ratios: &[f64],
+) -> Option<DMatrix<f64>> {
     let n = omega.len();
     let key = if ratios.len() == 1 { "structure.damping_ratio" } else { "structure.damping_ratios" };
     let known = checks.mistakes.len();
-    checks.demand(key, ratios.len() == 1 || ratios.len() == n, &format!("one ratio, or one a mode ({n})"), ratios.len());
+    checks.demand(
+        key,
+        ratios.len() == 1 || ratios.len() == n,
+        &format!("one ratio, or one a mode ({n})"),
+        ratios.len(),
+    );
     for ratio in ratios {
         checks.demand(key, (0.0..1.0).contains(ratio), "a ratio from 0 to below 1", ratio);
     }
@@ -243,7 +264,10 @@ fn rayleigh(
     let [one, two] = modes.map(|m| omega[m - 1]);
     let spread = two * two - one * one;
     if spread == 0.0 || one == 0.0 || two == 0.0 {
-        checks.mistake(key, format!("expected two modes of different frequencies above zero, found {one} and {two} rad/s"));
+        checks.mistake(
+            key,
+            format!("expected two modes of different frequencies above zero, found {one} and {two} rad/s"),
+        );
         return None;
     }
     // zeta = a / (2 omega) + b omega / 2 at both.

@@ -137,7 +137,12 @@ impl VirtualTest {
     pub fn new(config: TestConfig) -> Result<Self> {
         let mut checks = Checks::default();
         positive(&mut checks, "test.rate_hz", config.rate_hz);
-        checks.demand("test.tolerance", (1e-12..=0.1).contains(&config.tolerance), "a number from 1e-12 to 0.1", config.tolerance);
+        checks.demand(
+            "test.tolerance",
+            (1e-12..=0.1).contains(&config.tolerance),
+            "a number from 1e-12 to 0.1",
+            config.tolerance,
+        );
         if let Some(bound) = config.bound_m {
             positive(&mut checks, "test.bound_m", bound);
         }
@@ -145,7 +150,12 @@ impl VirtualTest {
         let n = config.structure.n_dof();
         let place = |checks: &mut Checks, dof: usize, from_dof: usize| {
             checks.demand("dof", (1..=n).contains(&dof), &format!("a degree of freedom from 1 to {n}"), dof);
-            checks.demand("from_dof", from_dof <= n && from_dof != dof, &format!("another one, from 0 (ground) to {n}"), from_dof);
+            checks.demand(
+                "from_dof",
+                from_dof <= n && from_dof != dof,
+                &format!("another one, from 0 (ground) to {n}"),
+                from_dof,
+            );
             (1..=n).contains(&dof) && from_dof <= n && from_dof != dof
         };
         let rate_hz = if config.rate_hz > 0.0 { config.rate_hz } else { 1.0 };
