@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from rthstrack.readers.contents import Contents
 
 _ENDINGS = {
-    "text": (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm", ".at2", ".prn", ".out"),
+    "text": (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm", ".prn", ".out"),
+    "PEER AT2": (".at2",),
     "MATLAB": (".mat",),
     "MATLAB v7.3": (".mat",),
     "HDF5": (".h5", ".hdf5", ".hdf", ".he5"),
@@ -163,8 +164,10 @@ def _reader(file: Path) -> tuple[str, Callable[[Path], Contents]]:
         from rthstrack.readers import numpy_file
 
         return "NumPy npy", numpy_file.read_npy
-    from rthstrack.readers import text
+    from rthstrack.readers import at2, text
 
+    if at2.recognised(file):
+        return "PEER AT2", at2.read
     named = next((k for k, endings in _ENDINGS.items() if k != "text" and file.suffix.lower() in endings), None)
     if named is None:
         return "text", text.read

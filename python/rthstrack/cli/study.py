@@ -1,0 +1,384 @@
+"""`rthstrack study SOURCE...`: what P and Q do to amplitude, delay and computing time."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import math
+import os
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rthstrack.assessment import json_ready
+from rthstrack.cli.evaluate import _count, _not_negative, _number, _positive, _scale
+from rthstrack.errors import RthstrackError, SettingError
+from rthstrack.study import COMBINED, POWERS, WEIGHT_POWERS, WINDOWS, Pair, Study, StudySettings, read_pairs, study
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Sequence
+
+    from rich.console import Console
+    from rich.table import Table
+
+    from rthstrack.study import Cell
+
+FAILED = 1
+_DESCRIPTION = """\
+Evaluates a test over grids of data decimation P and frequency decimation Q: amplitude, delay,
+their error against the truth where it is known, their change from P = Q = 1, and the computing
+time. By default the grids of Guo, Xu and Chen (2014): P and Q each alone from 1 to 512, and
+combined up to P = 64 and Q = 32. A positive delay means that measured lags.
+
+A SOURCE is a recorded test (text, MATLAB, HDF5, TDMS, Parquet, NumPy), a run that `rthstrack
+simulate` wrote, or a configuration (.toml), which is simulated first. Runs and configurations
+bring the truth with them.
+"""
+_EPILOG = """\
+examples:
+  rthstrack study run.h5 -o study
+  rthstrack study test.csv --target cmd --measured meas --true-delay 0.012 -o study
+  rthstrack study test.csv -P 1,4,16 -Q 1,2,4,8 --windows boxcar,tukey --weight-powers 1,2 --json
+
+With -o DIR: study.csv (a row a cell with every setting in it; a cell that leaves nothing to judge
+by has empty numbers and a reason) and, of each source, the figures data_decimation,
+frequency_decimation, computing_time and combined_WINDOW_lPOWER as PDF and PNG. With several
+sources their names begin with the source's number and name. Files of these names in DIR are
+overwritten, no others.
+Times are the fastest of several calls of a planned evaluator, one call at a time; planning is
+left out.
+Exit status: 0 every source was studied, 1 some source failed, 2 misuse.
+"""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Adds the command to the command line."""
+    parser = subparsers.add_parser(
+        "study",
+        help="what data decimation P and frequency decimation Q do to amplitude, delay and computing time",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("sources", nargs="+", metavar="SOURCE", help="recorded test, run file or configuration (.toml)")
+    grid = parser.add_argument_group("grid (lists with commas)")
+    powers = f"{POWERS[0]},{POWERS[1]},...,{POWERS[-1]}"
+    grid.add_argument("-P", metavar="LIST", help=f"data decimations, powers of two (default: {powers})")
+    grid.add_argument("-Q", metavar="LIST", help=f"frequency decimations, powers of two (default: {powers})")
+    grid.add_argument("--combined", nargs=2, type=_count, metavar=("P", "Q"),
+                      help="largest P and Q taken together; each alone goes as far as its list (default: "
+                      f"{COMBINED[0]} {COMBINED[1]}, or every P with every Q where -P or -Q is given)")  # fmt: skip
+    grid.add_argument("--windows", default=",".join(WINDOWS), metavar="LIST",
+                      help="of boxcar, hann, hamming, blackman, flattop, tukey (default: %(default)s)")  # fmt: skip
+    grid.add_argument("--weight-powers", default=",".join(map(str, WEIGHT_POWERS)), metavar="LIST",
+                      help="bins weigh |target|^L, 1 to 16 (default: %(default)s)")  # fmt: skip
+    signals = parser.add_argument_group("signals of recorded tests (a channel is named by name, path or #index)")
+    signals.add_argument("--target", action="append", metavar="T", help="what the model asks; repeat with --measured")
+    signals.add_argument("--measured", action="append", metavar="M", help="what the sensor says, one for each --target")
+    signals.add_argument(
+        "--scale", action="append", type=_scale, default=[], metavar="CHANNEL=X", help="multiply a channel"
+    )
+    rate = signals.add_mutually_exclusive_group()
+    rate.add_argument("--rate", type=_positive, metavar="HZ", help="sampling rate, where the file does not say")
+    rate.add_argument("--time", metavar="T", help="channel that holds the time")
+    signals.add_argument("--start", type=_not_negative, metavar="S", help="leave out what comes before, in seconds")
+    signals.add_argument("--end", type=_positive, metavar="S", help="leave out what comes after, in seconds")
+    signals.add_argument("--fill", type=_count, metavar="SAMPLES", help="interpolate gaps of up to so many samples")
+    signals.add_argument(
+        "--resample", type=_positive, metavar="HZ", help="interpolate uneven time stamps onto this rate"
+    )
+    truth = parser.add_argument_group("truth, in place of what a run or configuration says itself")
+    truth.add_argument("--true-amplitude", type=_positive, metavar="X", help="measured over target")
+    truth.add_argument("--true-delay", type=_number, metavar="S", help="in seconds; positive: measured lags")
+    method = parser.add_argument_group("evaluation")
+    method.add_argument("--estimator", choices=("fei",), default="fei", help="default: fei, the published one")
+    method.add_argument("--decimator", choices=("spectral", "chebyshev"), default="spectral", metavar="D",
+                        help="how P is done: spectral (default) or chebyshev, as published")  # fmt: skip
+    method.add_argument("--detrend", choices=("none", "mean", "linear"), default="none", metavar="D",
+                        help="none (default), mean or linear")  # fmt: skip
+    method.add_argument("--band", nargs=2, type=_not_negative, metavar=("LO", "HI"), help="frequencies judged, in Hz")
+    method.add_argument("--no-timing", action="store_true", help="measure no computing times")
+    output = parser.add_argument_group("output")
+    output.add_argument("-o", "--output", type=Path, metavar="DIR", help="write CSV and figures there; made if need be")
+    output.add_argument("--no-figures", action="store_true", help="write the CSV only")
+    output.add_argument("--json", action="store_true", help="print JSON instead of tables")
+    parser.set_defaults(run=lambda args: run(args, parser.error))
+
+
+def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
+    """Studies the sources; returns the exit status."""
+    if len(args.target or []) != len(args.measured or []):
+        misuse(f"--target and --measured go in pairs, found {len(args.target or [])} and {len(args.measured or [])}")
+    if args.resample and args.rate:
+        misuse("--resample interpolates the file's time stamps and excludes --rate")
+    if args.start is not None and args.end is not None and args.start >= args.end:
+        misuse(f"--start must come before --end, found {args.start:g} and {args.end:g}")
+    if args.no_figures and args.output is None:
+        misuse("--no-figures speaks of what -o DIR writes: give -o DIR")
+    settings = StudySettings(
+        None if args.P is None else _numbers(args.P),
+        None if args.Q is None else _numbers(args.Q),
+        args.combined and tuple(args.combined),
+        _items(args.windows),
+        _numbers(args.weight_powers),
+        args.estimator,
+        args.decimator,
+        args.detrend,
+        args.band and tuple(args.band),
+        not args.no_timing,
+    ).checked()
+    _make(args.output)
+    pairs, failures = _read_all(args)
+    found = None
+    if pairs:
+        with _progress("studying") as progress:
+            found = study(pairs, **dataclasses.asdict(settings), truth=_truth(args), progress=progress)
+    written = _write(found, args) if found is not None else []
+    if args.json:
+        document = {
+            "study": None if found is None else json_ready(found.to_dict()),
+            "failures": [{"file": file, "error": error} for file, error in failures],
+        }
+        print(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False))
+    elif found is not None:
+        _print_text(found)
+    for _, error in failures:
+        print(f"rthstrack: {error}", file=sys.stderr)
+    for note in written:
+        print(note, file=sys.stderr)
+    return FAILED if failures else 0
+
+
+def _items(text: str) -> tuple[str, ...]:
+    return tuple(item.strip() for item in text.split(",")) if text.strip() else ()
+
+
+def _numbers(text: str) -> tuple[Any, ...]:
+    """Whole numbers; what is none stays text, for the check to name."""
+    return tuple(int(item) if item.removeprefix("-").isdecimal() else item for item in _items(text))
+
+
+def _truth(args: argparse.Namespace) -> tuple[float, float] | None:
+    given = (args.true_amplitude, args.true_delay)
+    if given == (None, None):
+        return None
+    amplitude, delay_s = (math.nan if value is None else value for value in given)
+    return amplitude, delay_s
+
+
+def _make(directory: Path | None) -> None:
+    """Makes the directory before anything is computed."""
+    if directory is None:
+        return
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SettingError(f"-o {directory}: cannot make this directory ({error.strerror}); name another") from None
+
+
+def _read_all(args: argparse.Namespace) -> tuple[list[Pair], list[tuple[str, str]]]:
+    """The pairs of all sources, read and simulated on all cores; one that fails does not stop the rest."""
+
+    def one(file: str) -> list[Pair] | str:
+        try:
+            return read_pairs(
+                file,
+                targets=args.target or (),
+                measured=args.measured or (),
+                rate_hz=args.rate,
+                time=args.time,
+                resample_hz=args.resample,
+                scale=dict(args.scale),
+                fill=args.fill,
+                start_s=args.start,
+                end_s=args.end,
+            )
+        except RthstrackError as error:
+            message = str(error)
+            return message if message.startswith(file) else f"{file}: {message}"
+        except MemoryError:
+            return f"{file}: does not fit into memory"
+
+    pairs: list[Pair] = []
+    failures = []
+    files = list(dict.fromkeys(args.sources))
+    with ThreadPoolExecutor(max_workers=min(len(files), os.cpu_count() or 1)) as pool, _progress("reading") as progress:
+        for done, (file, outcome) in enumerate(zip(files, pool.map(one, files), strict=True), start=1):
+            if progress is not None:
+                progress(done, len(files))
+            if isinstance(outcome, str):
+                failures.append((file, outcome))
+            else:
+                pairs += outcome
+    return pairs, failures
+
+
+@contextmanager
+def _progress(what: str) -> Iterator[Callable[[int, int], object] | None]:
+    """A progress bar on standard error, where that is a terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(what)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def _write(found: Study, args: argparse.Namespace) -> list[str]:
+    """CSV and figures; returns what was written, one line each."""
+    if args.output is None:
+        return []
+    path = args.output / "study.csv"
+    found.to_csv(path)
+    notes = [f"cells written to {path}"]
+    if not args.no_figures:
+        from rthstrack.study_plots import write_study_figures
+
+        figures = write_study_figures(found, args.output)
+        notes.append(f"{len(figures)} figures written to {args.output}: {', '.join(p.name for p in figures)}")
+    return notes
+
+
+# ------------------------------------------------------------------------------------------------------------- tables
+
+
+def _print_text(found: Study) -> None:
+    from rich.console import Console
+    from rich.text import Text
+
+    # Into a file or pipe nothing is folded at a terminal's width.
+    console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 200)
+    if len(found.sources) > 1:
+        _print_summary(console, found)
+    for source in found.sources:
+        if len(found.sources) == 1:
+            about = f"{source.target_name}, {source.measured_name}, {source.n_samples} samples at {source.rate_hz:g} Hz"
+            console.print(Text(source.name, style="bold") + Text(f": {about}", style="dim"))
+            for window in found.settings.windows:
+                for power in found.settings.weight_powers:
+                    _print_grid(console, found, found.select(source=source.name, window=window, weight_power=power))
+        for note in source.notes:
+            console.print(Text(f"{source.name}: ", style="yellow") + Text(note))
+    if invalid := [cell for cell in found.cells if cell.reason]:
+        count = f"{len(invalid)} of {len(found.cells)} cells could not be determined, the first: "
+        console.print(Text(count, style="yellow") + Text(invalid[0].reason))
+
+
+def _print_grid(console: Console, found: Study, cells: Sequence[Cell]) -> None:
+    """P alone and Q alone as one table, the combinations as small ones beside each other."""
+    from rich.columns import Columns
+    from rich.text import Text
+
+    settings = cells[0].settings
+    console.print(Text(f"\n{settings.window} window, weight power {settings.weight_power}", style="bold"))
+    known = any(math.isfinite(c.true_amplitude) or math.isfinite(c.true_delay_s) for c in cells)
+    alone = _table()
+    names = [
+        "P",
+        "Q",
+        "A",
+        "A error %" if known else "A change %",
+        "d ms",
+        "d error %" if known else "d change %",
+        "at Hz",
+    ]
+    for name in [*names, *(["time us"] if found.settings.timing else [])]:
+        alone.add_column(name, justify="right", no_wrap=True)
+    by_p = [c for c in cells if c.settings.frequency_decimation == 1]
+    by_q = [c for c in cells if c.settings.data_decimation == 1]
+    sections = [section for section in (by_p, by_q) if len(section) > 1] or [by_p or by_q]
+    for section in sections:
+        if section is not sections[0]:
+            alone.add_row()
+        for c in section:
+            a, d = (c.amplitude_error, c.delay_error) if known else (c.amplitude_change, c.delay_change)
+            alone.add_row(
+                str(c.settings.data_decimation),
+                str(c.settings.frequency_decimation),
+                _text(c.amplitude, ".5f"),
+                _text(100 * a, "+.3f"),
+                _text(1e3 * c.delay_s, ".4f"),
+                _text(100 * d, "+.3f"),
+                _text(c.equivalent_frequency_hz, ".4g"),
+                *([_text(1e6 * c.computing_time_s, ".1f")] if found.settings.timing else []),
+            )
+    if alone.row_count:
+        console.print(alone)
+    both = [c for c in cells if c.settings.data_decimation > 1 and c.settings.frequency_decimation > 1]
+    if both:
+        shown = [("A", lambda c: _text(c.amplitude, ".4f")), ("d ms", lambda c: _text(1e3 * c.delay_s, ".3f"))]
+        if found.settings.timing:
+            shown.append(("time us", lambda c: _text(1e6 * c.computing_time_s, ".0f")))
+        console.print(Columns([_matrix(name, cells, both, write) for name, write in shown], padding=(0, 4)))
+
+
+def _matrix(name: str, cells: Sequence[Cell], both: Sequence[Cell], write: Callable[[Cell], str]) -> Table:
+    """P down, Q across, as far as they are combined, with P = 1 and Q = 1 beside."""
+    table = _table(title=f"{name}, P down, Q across")
+    all_p = sorted({1, *(c.settings.data_decimation for c in both)})
+    all_q = sorted({1, *(c.settings.frequency_decimation for c in both)})
+    written = {(c.settings.data_decimation, c.settings.frequency_decimation): write(c) for c in cells}
+    for head in ("", *map(str, all_q)):
+        table.add_column(head, justify="right", no_wrap=True)
+    for p in all_p:
+        row = [written.get((p, q), "") for q in all_q]
+        if any(row):
+            table.add_row(str(p), *row)
+    return table
+
+
+def _print_summary(console: Console, found: Study) -> None:
+    """A line a source, window and weight power: P = Q = 1, and the largest changes from it."""
+    from rich.text import Text
+
+    table = _table()
+    table.add_column("source", overflow="fold")
+    table.add_column("window")
+    heads = ["l", "A", "d ms", "at Hz", "A error %", "d error %", "A change %", "d change %", "not valid"]
+    for name in [*heads, *(["time us"] if found.settings.timing else [])]:
+        table.add_column(name, justify="right", no_wrap=True)
+    for source in found.source_names:
+        for window in found.settings.windows:
+            for power in found.settings.weight_powers:
+                cells = found.select(source=source, window=window, weight_power=power)
+                first = cells[0]
+                times = [c.computing_time_s for c in cells if math.isfinite(c.computing_time_s)]
+                table.add_row(
+                    Text(source),
+                    window,
+                    str(power),
+                    _text(first.amplitude, ".5f"),
+                    _text(1e3 * first.delay_s, ".4f"),
+                    _text(first.equivalent_frequency_hz, ".4g"),
+                    _text(100 * first.amplitude_error, "+.3f"),
+                    _text(100 * first.delay_error, "+.3f"),
+                    _text(100 * _largest(c.amplitude_change for c in cells), ".3f"),
+                    _text(100 * _largest(c.delay_change for c in cells), ".3f"),
+                    str(sum(bool(c.reason) for c in cells) or ""),
+                    *(
+                        [f"{1e6 * min(times):.0f} to {1e6 * max(times):.0f}" if times else ""]
+                        if found.settings.timing
+                        else []
+                    ),
+                )
+    console.print(table)
+
+
+def _largest(values: Iterable[float]) -> float:
+    return max((abs(value) for value in values if math.isfinite(value)), default=math.nan)
+
+
+def _text(value: float, layout: str) -> str:
+    return format(value, layout) if math.isfinite(value) else "-"
+
+
+def _table(title: str | None = None) -> Table:
+    from rich.table import Table
+
+    return Table(box=None, pad_edge=False, title=title, title_justify="left", title_style="dim")
