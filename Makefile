@@ -9,6 +9,7 @@ MAKEFLAGS += --no-builtin-rules --no-print-directory
 PYTHON ?= python3
 BIN := .venv/bin
 OUT := build
+PEERS := $(OUT)/peers
 # One interpreter for every cargo command: with another, cargo would build the bindings anew each time.
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 export MPLBACKEND := Agg
@@ -95,6 +96,11 @@ fuzz: .venv/built toolchain ## damaged input at length: 200,000 for our reader, 
 	@$(call ran_some,$(OUT)/fuzz.log)
 	@RTHSTRACK_FUZZ=5000 $(BIN)/pytest tests/test_readers_damage.py
 
+.PHONY: test-peers
+test-peers: $(PEERS)/ready .venv/built ## virtual tests beside OpenSees; downloads openseespy into an environment of its own
+	$(call say,virtual tests beside OpenSees)
+	@$(PEERS)/bin/python -m pytest peers
+
 .PHONY: bench
 bench: .venv/built ## benchmark beside SciPy; writes docs/benchmarks.md
 	@$(BIN)/python benchmarks/bench.py
@@ -139,4 +145,17 @@ toolchain:
 .venv/built: .venv/ready $(RUST_SOURCES) | toolchain
 	$(call say,building rthstrack._core)
 	@PIP_QUIET=1 VIRTUAL_ENV="$(CURDIR)/.venv" $(BIN)/maturin develop --release --locked --quiet
+	@touch $@
+
+# The packages of .venv are seen from here, ours too; nothing is added to them.
+$(PEERS)/ready: peers/constraints.txt .venv/ready
+	$(call say,virtual environment of the peers)
+	@rm -rf $(PEERS)
+	@$(BIN)/python -m venv $(PEERS)
+	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --only-binary :all: \
+		--requirement peers/constraints.txt || { \
+			echo "make: no wheel of openseespy could be had (above: why); nothing was compared with OpenSees"; exit 1; }
+	@site=$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))'); \
+	here=$$($(PEERS)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))'); \
+	printf 'import site; site.addsitedir(%s)\n' "'$$site'" > "$$here/rthstrack-environment.pth"
 	@touch $@
