@@ -216,17 +216,6 @@ def test_a_labview_measurement_file_is_read_below_its_headers(tmp_path: Path) ->
     assert recording.rate_hz == 500.0
 
 
-def test_a_strong_motion_header_is_no_row_of_names(tmp_path: Path) -> None:
-    header = (
-        "PEER NGA STRONG MOTION DATABASE RECORD\nNorthridge-01, 1/17/1994, Canoga Park\n"
-        "ACCELERATION TIME SERIES IN UNITS OF G\nNPTS=   10, DT=   .0100 SEC\n"
-    )
-    rows = "  -.1219107E-02  -.1174382E-02  -.1200978E-02  -.1160988E-02  -.1187677E-02\n" * 2
-    recording = read(tmp_path, header + rows, "file.at2")
-    assert [c.name for c in recording.channels] == [f"column {i}" for i in range(5)]
-    assert (recording.rate_hz, recording.rate_source) == (100.0, "header 'DT'")
-
-
 def test_the_raw_export_of_a_machine_is_read_whole(shared: Path) -> None:
     path = shared / "records" / "utfsm_15Hz_0A.txt"
     recording = read_recording(path)

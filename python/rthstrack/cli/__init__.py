@@ -8,7 +8,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from rthstrack._core import __version__
-from rthstrack.cli import channels, evaluate
+from rthstrack.cli import channels, evaluate, reproduce, simulate, study
 from rthstrack.errors import RthstrackError, SettingError
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--version", action="version", version=f"rthstrack {__version__}")
     subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for command in (evaluate, channels):
+    for command in (simulate, evaluate, channels, study, reproduce):
         command.add_parser(subparsers)
     args = parser.parse_args(argv)
     try:
@@ -33,7 +33,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return status
     except RthstrackError as error:
-        print(f"rthstrack: {error}", file=sys.stderr)
+        for line in str(error).splitlines():
+            print(f"rthstrack: {line}", file=sys.stderr)
         return MISUSE if isinstance(error, SettingError) else 1
     except BrokenPipeError:
         # Whoever read the output has had enough; nothing more may be written, not even at exit.

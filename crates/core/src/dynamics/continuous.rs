@@ -10,7 +10,7 @@
 
 use nalgebra::DMatrix;
 
-use super::actuator::{Delay, Dynamics, StateSpace, servo_rate};
+use super::actuator::{Delay, Dynamics, StateSpace, across, servo_rate};
 use super::history::{History, Motion, Tap};
 use super::law::Law;
 use super::structure::rows;
@@ -28,10 +28,11 @@ const MAX_STEPS: f64 = 4096.0;
 
 pub(crate) fn run(test: &VirtualTest, ground: &[f64], noise: &Noise, bound: f64) -> Result<Run> {
     let mut steps = first_steps(test)?;
-    let mut coarse = attempt(test, ground, bound, steps);
+    // The first is only compared with, and keeps no more than that needs.
+    let mut coarse = attempt(test, ground, bound, steps, false);
     for _ in 0..MAX_HALVINGS {
         steps *= 2;
-        let mut fine = attempt(test, ground, bound, steps);
+        let mut fine = attempt(test, ground, bound, steps, true);
         if let (Ok(one), Ok(two)) = (&coarse, &mut fine) {
             two.error_estimate = difference(one, two);
         }
@@ -121,6 +122,8 @@ struct Rig {
     history: History,
     /// A constant delay of a step or more: where it lies at the middle and at the end of a step.
     taps: Option<[Tap; 2]>,
+    /// Whether anything behind the delay feels its acceleration.
+    heavy: bool,
     /// What it finds at the end of a step, and so at the start of the next.
     ahead: Motion,
     lookup: Lookup,
@@ -182,6 +185,7 @@ impl<'a> Equations<'a> {
             rigs.push(Rig {
                 history: History::new(actuator.delay.range().1 / step_s, step_s),
                 taps,
+                heavy: actuator.specimen_mass > 0.0 || system.is_some(),
                 ahead: Motion::default(),
                 lookup: Lookup::Now,
                 pace: 1.0,
@@ -202,12 +206,12 @@ impl<'a> Equations<'a> {
     }
 
     /// Finds each actuator's delayed target for the stage at `reach` (0, 1/2, 1) of the step that begins at `time`.
-    #[inline]
+    #[inline(always)]
     fn look(&mut self, time: f64, reach: f64, h: f64) {
         for (rig, actuator) in self.rigs.iter_mut().zip(&self.test.config.actuators) {
             if let Some([middle, end]) = &rig.taps {
                 if reach > 0.0 {
-                    rig.ahead = rig.history.at(if reach < 1.0 { middle } else { end });
+                    rig.ahead = rig.history.at(if reach < 1.0 { middle } else { end }, rig.heavy);
                 }
                 rig.lookup = Lookup::Past(rig.ahead);
                 continue;
@@ -228,46 +232,57 @@ impl<'a> Equations<'a> {
 
     /// Writes a sample of every signal; whether all of them are within the bound.
     fn record(&self, run: &mut Run, sample: usize, x: &[f64], bound: f64) -> bool {
-        let mut within = true;
-        for (signal, x) in run.displacement.iter_mut().zip(x) {
-            signal[sample] = *x;
-            within &= x.abs() <= bound;
-        }
+        let mut within = x.iter().all(|x| x.abs() <= bound);
         for (i, rig) in self.rigs.iter().enumerate() {
             run.target[i][sample] = rig.seen.target;
-            run.command[i][sample] = rig.seen.target;
             run.measured[i][sample] = rig.seen.measured;
-            run.force[i][sample] = rig.seen.force;
             within &= rig.seen.measured.abs() <= bound && rig.seen.force.is_finite();
+            if let Some(force) = run.force[i].get_mut(sample) {
+                *force = rig.seen.force;
+            }
+        }
+        for (signal, x) in run.displacement.iter_mut().zip(x) {
+            if let Some(place) = signal.get_mut(sample) {
+                *place = *x;
+            }
         }
         within
     }
 
-    /// y' at a stage; leaves what the actuators did in `seen`. N is n where the compiler should know it, else 0.
-    #[inline]
-    fn rate<const N: usize>(&mut self, ground: f64, y: &[f64], out: &mut [f64]) {
-        let n = if N > 0 { N } else { self.n };
+    /// y' at a stage; leaves what the actuators did in `seen`. ONE says that there is one degree of freedom and
+    /// one law and nothing else, so that the whole state can stay in registers.
+    #[inline(always)]
+    fn rate<const ONE: bool>(&mut self, ground: f64, y: &[f64], out: &mut [f64]) {
+        let n = if ONE { 1 } else { self.n };
         let (x, rest) = y.split_at(n);
         let v = &rest[..n];
+        let (mut single, mut several) = ([0.0; 1], std::mem::take(&mut self.force));
+        let force: &mut [f64] = if ONE { &mut single } else { &mut several };
+        let across = |dof: usize, from_dof: usize, x: &[f64]| if ONE { x[0] } else { across(dof, from_dof, x) };
+        let push = |force: &mut [f64], dof: usize, from_dof: usize, value: f64| {
+            if ONE { force[0] -= value } else { across_add(force, dof, from_dof, -value) }
+        };
         for i in 0..n {
-            self.force[i] = -self.test.load[i] * ground;
+            force[i] = -self.test.load[i] * ground;
         }
         for (matrix, motion) in [(&self.damping, v), (&self.stiffness, x)] {
             if let Some(matrix) = matrix {
                 for i in 0..n {
                     let row = &matrix[i * n..(i + 1) * n];
-                    self.force[i] -= row.iter().zip(motion).map(|(a, b)| a * b).sum::<f64>();
+                    force[i] -= row.iter().zip(motion).map(|(a, b)| a * b).sum::<f64>();
                 }
             }
         }
-        let mut memory = self.elements;
+        let mut memory = if ONE { 2 } else { self.elements };
         for element in &self.test.config.elements {
-            let force = answer(&element.law, element.across(x), element.across(v), y, memory, out);
-            across_add(&mut self.force, element.dof, element.from_dof, -force);
+            let (dof, from_dof) = (element.dof, element.from_dof);
+            let (at, velocity) = (across(dof, from_dof, x), across(dof, from_dof, v));
+            push(force, dof, from_dof, answer(&element.law, at, velocity, y, memory, out));
             memory += 2;
         }
         for (rig, actuator) in self.rigs.iter_mut().zip(&self.test.config.actuators) {
-            let (target, velocity) = (actuator.across(x), actuator.across(v));
+            let (dof, from_dof) = (actuator.dof, actuator.from_dof);
+            let (target, velocity) = (across(dof, from_dof, x), across(dof, from_dof, v));
             let mut input = match rig.lookup {
                 Lookup::Past(motion) => motion,
                 Lookup::Now => Motion { displacement: target, velocity, acceleration: 0.0 },
@@ -279,7 +294,7 @@ impl<'a> Equations<'a> {
             } * actuator.gain;
             input.velocity *= rig.pace;
             input.acceleration *= rig.pace * rig.pace;
-            let (motion, force) = if let Dynamics::ServoHydraulic(servo) = &actuator.dynamics {
+            let (motion, answered) = if let Dynamics::ServoHydraulic(servo) = &actuator.dynamics {
                 let w = &y[rig.dynamics..rig.memory];
                 servo_rate(actuator, servo, w, input.displacement, &mut out[rig.dynamics..rig.memory]);
                 (w[3], w[2])
@@ -288,23 +303,24 @@ impl<'a> Equations<'a> {
                     None => input,
                     Some(system) => follow(system, input, &y[rig.dynamics..], &mut out[rig.dynamics..]),
                 };
-                let mut force = actuator.specimen_mass * motion.acceleration;
-                let mut memory = rig.memory;
+                let mut answered = actuator.specimen_mass * motion.acceleration;
+                let mut memory = if ONE { 2 } else { rig.memory };
                 for law in &actuator.specimen {
-                    force += answer(law, motion.displacement, motion.velocity, y, memory, out);
+                    answered += answer(law, motion.displacement, motion.velocity, y, memory, out);
                     memory += 2;
                 }
-                (motion.displacement, force)
+                (motion.displacement, answered)
             };
-            rig.seen = Seen { target, measured: motion, force };
-            across_add(&mut self.force, actuator.dof, actuator.from_dof, -force);
+            rig.seen = Seen { target, measured: motion, force: answered };
+            push(force, dof, from_dof, answered);
         }
-        if N == 1 {
-            out[0] = v[0];
+        if ONE {
+            (out[0], out[1]) = (v[0], self.inverse[0] * force[0]);
         } else {
             out[..n].copy_from_slice(v);
+            super::sampled::multiply(&self.inverse, force, &mut out[n..2 * n]);
         }
-        super::sampled::multiply(&self.inverse[..n * n], &self.force[..n], &mut out[n..2 * n]);
+        self.force = several;
     }
 }
 
@@ -333,20 +349,25 @@ fn follow(system: &StateSpace, input: Motion, w: &[f64], out: &mut [f64]) -> Mot
     motion
 }
 
+/// What an actuator spans of a vector over the degrees of freedom.
+#[inline(always)]
+fn place<const ONE: bool>(actuator: &super::Actuator, x: &[f64]) -> f64 {
+    if ONE { x[0] } else { actuator.across(x) }
+}
+
 /// The whole record with a fixed number of steps a sample, of the ideal sensors.
-fn attempt(test: &VirtualTest, ground: &[f64], bound: f64, steps: usize) -> Result<Run> {
-    match test.config.structure.n_dof() {
-        1 => stepped::<1>(test, ground, bound, steps),
-        _ => stepped::<0>(test, ground, bound, steps),
+fn attempt(test: &VirtualTest, ground: &[f64], bound: f64, steps: usize, whole: bool) -> Result<Run> {
+    let equations = Equations::new(test, 1.0 / test.config.rate_hz / steps as f64)?;
+    let n_blocks = equations.len.div_ceil(4);
+    match (equations.n, n_blocks) {
+        (1, 1) => stepped::<true, _>([[0.0; 4]; 1], equations, ground, bound, steps, whole),
+        _ => stepped::<false, _>(vec![[0.0; 4]; n_blocks], equations, ground, bound, steps, whole),
     }
 }
 
-/// The state in blocks that fill a vector register, whatever its length.
-type Blocks = Vec<[f64; 4]>;
-
-/// `f` of every number of two and a third, block by block.
+/// `f` of every number of two states into a third. States come in blocks that fill a vector register, whatever their length.
 #[inline(always)]
-fn combine(out: &mut Blocks, y: &Blocks, k: &Blocks, f: impl Fn(f64, f64) -> f64) {
+fn combine(out: &mut [[f64; 4]], y: &[[f64; 4]], k: &[[f64; 4]], f: impl Fn(f64, f64) -> f64) {
     for ((out, y), k) in out.iter_mut().zip(y).zip(k) {
         for i in 0..4 {
             out[i] = f(y[i], k[i]);
@@ -354,54 +375,64 @@ fn combine(out: &mut Blocks, y: &Blocks, k: &Blocks, f: impl Fn(f64, f64) -> f64
     }
 }
 
-fn stepped<const N: usize>(test: &VirtualTest, ground: &[f64], bound: f64, steps: usize) -> Result<Run> {
+/// ONE and the type of the state tell the compiler the sizes of the commonest test.
+fn stepped<const ONE: bool, S: Clone + AsRef<[[f64; 4]]> + AsMut<[[f64; 4]]>>(
+    rest: S,
+    mut equations: Equations<'_>,
+    ground: &[f64],
+    bound: f64,
+    steps: usize,
+    whole: bool,
+) -> Result<Run> {
+    let test = equations.test;
     let dt = 1.0 / test.config.rate_hz;
-    let h = dt / steps as f64;
-    let mut equations = Equations::new(test, h)?;
-    let n = equations.n;
-    let blocks = || vec![[0.0; 4]; equations.len.div_ceil(4)];
-    let (mut y, mut ahead, mut total, mut k): (Blocks, Blocks, Blocks, Blocks) =
-        (blocks(), blocks(), blocks(), blocks());
-    let mut run = Run::sized(equations.rigs.len(), n, ground.len(), steps);
+    let (h, n) = (dt / steps as f64, if ONE { 1 } else { equations.n });
+    let (mut y, mut ahead, mut total, mut k) = (rest.clone(), rest.clone(), rest.clone(), rest);
+    let mut run = Run::sized(equations.rigs.len(), n, if whole { ground.len() } else { 0 }, steps);
+    for signal in run.target.iter_mut().chain(&mut run.measured) {
+        signal.resize(ground.len(), 0.0);
+    }
     for sample in 0..ground.len() {
         let from = ground[sample];
         let slope = ground.get(sample + 1).map_or(0.0, |to| (to - from) / steps as f64);
         for step in 0..steps {
             let time = (sample * steps + step) as f64 * h;
             let at = from + slope * step as f64;
-            let now = y.as_flattened();
+            let now = y.as_ref().as_flattened();
             for (rig, actuator) in equations.rigs.iter_mut().zip(&test.config.actuators) {
-                let (displacement, velocity) = (actuator.across(&now[..n]), actuator.across(&now[n..2 * n]));
+                let (displacement, velocity) =
+                    (place::<ONE>(actuator, &now[..n]), place::<ONE>(actuator, &now[n..2 * n]));
                 rig.history.push(Motion { displacement, velocity, acceleration: 0.0 });
             }
             equations.look(time, 0.0, h);
-            equations.rate::<N>(at, now, k.as_flattened_mut());
+            equations.rate::<ONE>(at, now, k.as_mut().as_flattened_mut());
             for (rig, actuator) in equations.rigs.iter_mut().zip(&test.config.actuators) {
-                rig.history.accelerate(actuator.across(&k.as_flattened()[n..2 * n]));
+                rig.history.accelerate(place::<ONE>(actuator, &k.as_ref().as_flattened()[n..2 * n]));
             }
             if step == 0 {
                 if !equations.record(&mut run, sample, &now[..n], bound) {
                     return Err(Error::Unstable { time_s: sample as f64 * dt, bound_m: bound });
                 }
                 if sample + 1 == ground.len() {
+                    run.command.clone_from(&run.target);
                     return Ok(run);
                 }
             }
-            combine(&mut total, &y, &k, |y, k| y + h / 6.0 * k);
-            combine(&mut ahead, &y, &k, |y, k| y + 0.5 * h * k);
+            combine(total.as_mut(), y.as_ref(), k.as_ref(), |y, k| y + h / 6.0 * k);
+            combine(ahead.as_mut(), y.as_ref(), k.as_ref(), |y, k| y + 0.5 * h * k);
             equations.look(time, 0.5, h);
             for reach in [0.5 * h, h] {
-                equations.rate::<N>(at + 0.5 * slope, ahead.as_flattened(), k.as_flattened_mut());
-                for (total, k) in total.iter_mut().zip(&k) {
+                equations.rate::<ONE>(at + 0.5 * slope, ahead.as_ref().as_flattened(), k.as_mut().as_flattened_mut());
+                for (total, k) in total.as_mut().iter_mut().zip(k.as_ref()) {
                     for i in 0..4 {
                         total[i] += h / 3.0 * k[i];
                     }
                 }
-                combine(&mut ahead, &y, &k, |y, k| y + reach * k);
+                combine(ahead.as_mut(), y.as_ref(), k.as_ref(), |y, k| y + reach * k);
             }
             equations.look(time, 1.0, h);
-            equations.rate::<N>(at + slope, ahead.as_flattened(), k.as_flattened_mut());
-            combine(&mut y, &total, &k, |total, k| total + h / 6.0 * k);
+            equations.rate::<ONE>(at + slope, ahead.as_ref().as_flattened(), k.as_mut().as_flattened_mut());
+            combine(y.as_mut(), total.as_ref(), k.as_ref(), |total, k| total + h / 6.0 * k);
         }
     }
     Ok(run)
@@ -448,7 +479,7 @@ mod tests {
     fn errors(test: &VirtualTest) -> Vec<f64> {
         let push = |t: f64| 3.0 * (5.0 * t).sin() * t * (-t).exp();
         let ground: Vec<f64> = (0..640).map(|i| push(f64::from(i) / 64.0)).collect();
-        let run = |steps| attempt(test, &ground, 1e3, steps).unwrap().target.remove(0);
+        let run = |steps| attempt(test, &ground, 1e3, steps, true).unwrap().target.remove(0);
         let fine = run(256);
         let largest = |x: &[f64], y: &[f64]| x.iter().zip(y).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()));
         let peak = largest(&fine, &vec![0.0; fine.len()]);

@@ -137,9 +137,9 @@ impl History {
         Motion { displacement, velocity, acceleration }
     }
 
-    /// The same at a constant distance, on a grid whose newest acceleration is known.
+    /// The same at a constant distance, on a grid whose newest acceleration is known; acceleration only where wanted.
     #[inline]
-    pub(crate) fn at(&self, tap: &Tap) -> Motion {
+    pub(crate) fn at(&self, tap: &Tap, accelerated: bool) -> Motion {
         if tap.reach >= self.n_pushed {
             return Motion::default();
         }
@@ -151,7 +151,11 @@ impl History {
         Motion {
             displacement: mix(p, old.displacement, old.velocity, new.displacement, new.velocity),
             velocity: mix(p, old.velocity, old.acceleration, new.velocity, new.acceleration),
-            acceleration: mix(d, old.velocity, old.acceleration, new.velocity, new.acceleration),
+            acceleration: if accelerated {
+                mix(d, old.velocity, old.acceleration, new.velocity, new.acceleration)
+            } else {
+                0.0
+            },
         }
     }
 

@@ -1,0 +1,100 @@
+"""The folder that `reproduce` writes: figures, tables, CSV of everything drawn, and the claims."""
+
+from __future__ import annotations
+
+import csv
+import math
+import platform
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy
+
+from rthstrack._core import __version__
+from rthstrack.errors import RecordingError, SettingError
+from rthstrack.plots import _style
+from rthstrack.reproduce import figures, paper, tables
+from rthstrack.reproduce.claims import TERMS, Claim
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from rthstrack.reproduce import Reproduction
+
+_CLAIM_COLUMNS = ("section", "statement", "printed", "ours", "verdict", "why")
+
+
+def prepare(out: Path) -> None:
+    """Makes the folder, before anything is computed. Raises SettingError."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SettingError(f"{out}: cannot make this folder ({error.strerror}); name another") from None
+
+
+def write(r: Reproduction, out: Path, progress: Callable[[int, int], object]) -> None:
+    """Writes everything. Files of the same names are overwritten, no others. Raises RecordingError."""
+    total = len(figures.FIGURES) + 1 + len(tables.TABLES) + 1
+    try:
+        for done, plate in enumerate(figures.plates(r), start=1):
+            _save(figures.draw(plate), out / plate.name)
+            _write_csv(out / f"{plate.name}.csv", figures.rows(plate))
+            progress(done, total)
+        for done, name in enumerate(tables.TABLES, start=total - len(tables.TABLES)):
+            _save(tables.draw(r, name), out / name)
+            _write_csv(out / f"{name}.csv", tables.rows(r, name))
+            progress(done, total)
+        claims = r.claims
+        _write_csv(
+            out / "claims.csv", [_CLAIM_COLUMNS, *([getattr(c, name) for name in _CLAIM_COLUMNS] for c in claims)]
+        )
+        (out / "claims.md").write_text(claims_text(r, claims), encoding="utf-8")
+        progress(total, total)
+    except OSError as error:
+        raise RecordingError(f"cannot write {error.filename}: {error.strerror}") from None
+
+
+def claims_text(r: Reproduction, claims: Sequence[Claim]) -> str:
+    """The claims as Markdown: what was used, what words mean, and a table."""
+    count = Counter(claim.verdict for claim in claims)
+    lines = [
+        "# Statements of the paper, one by one",
+        "",
+        f"{paper.CITATION}. {len(claims)} quantitative statements: {count['agrees']} agree, {count['does not agree']} "
+        f"do not, {count['cannot be compared']} cannot be compared.",
+        "",
+        f"rthstrack {__version__}, Python {platform.python_version()}, NumPy {np.__version__}, SciPy "
+        f"{scipy.__version__}, {platform.machine()}; {r.seconds:.0f} s for tests, readings and timing.",
+        "",
+        "Records:",
+        "",
+    ]
+    for name, used in r.records.items():
+        lines.append(f"- {name}: {used.remark or used.motion.name} ({used.motion.source})")
+    lines += ["", "Words:", "", *(f"- {term}" for term in TERMS), ""]
+    lines += [
+        "| section | statement | printed | ours | verdict | why, remarks |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for c in claims:
+        verdict = f"**{c.verdict}**" if c.verdict == "does not agree" else c.verdict
+        cells = (c.section, c.statement, c.printed, c.ours, verdict, c.why)
+        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _save(figure: Figure, stem: Path) -> None:
+    with _style():
+        # Without a date, so that the same numbers make the same file.
+        figure.savefig(stem.with_name(f"{stem.name}.pdf"), metadata={"CreationDate": None})
+        figure.savefig(stem.with_name(f"{stem.name}.png"), dpi=300)
+
+
+def _write_csv(path: Path, rows: Iterable[Sequence[str | float]]) -> None:
+    with open(path, "w", newline="", encoding="utf-8") as out:
+        csv.writer(out).writerows(
+            ["" if isinstance(cell, float) and math.isnan(cell) else cell for cell in row] for row in rows
+        )
