@@ -25,7 +25,7 @@ import rthstrack
 from rthstrack import evaluate
 from rthstrack.errors import UnstableError
 from rthstrack.ground_motion import list_records, record
-from rthstrack.simulate import Actuator, BoucWen, Spring, Structure, VirtualTest, simulate_many
+from rthstrack.virtual_test import Actuator, BoucWen, Spring, Structure, VirtualTest, simulate_many
 
 if TYPE_CHECKING:
     from collections.abc import Callable

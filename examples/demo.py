@@ -1,7 +1,7 @@
 """The main job: the paper's linear test (Guo, Xu and Chen 2014, section 3.1.1) run, judged, and reported.
 
-Truth: the actuator lags by 1 ms and overshoots by 10 %. The ground motion is the paper's record CHY101-N, or a synthetic
-one where the extra `records` is not installed.
+Truth: the actuator lags by 1 ms and overshoots by 10 %. The ground motion is the paper's record CHY101-N, or a
+synthetic one where the extra `records` is not installed.
 """
 
 import importlib.util

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from rthstrack.ground_motion import record, synthetic_ground_motion
-from rthstrack.simulate import (
+from rthstrack.virtual_test import (
     Actuator,
     BaberWen,
     BoucWen,

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from rthstrack.configuration import configuration_from, read_configuration, to_table, virtual_test_from
 from rthstrack.errors import ConfigurationError, SettingError
-from rthstrack.simulate import (
+from rthstrack.virtual_test import (
     Actuator,
     BaberWen,
     BoucWen,

@@ -15,7 +15,7 @@ import pytest
 from rthstrack.cli import main
 from rthstrack.errors import RecordingError, SettingError
 from rthstrack.ground_motion import GroundMotion, record
-from rthstrack.reproduce import (
+from rthstrack.reproduction import (
     CHEBYSHEV,
     SCIPY,
     SPECTRAL,
@@ -27,9 +27,9 @@ from rthstrack.reproduce import (
     tables,
     writing,
 )
-from rthstrack.reproduce.cases import CASES, choose_records, laboratory
-from rthstrack.reproduce.claims import Claim
-from rthstrack.simulate import true_tracking
+from rthstrack.reproduction.cases import CASES, choose_records, laboratory
+from rthstrack.reproduction.claims import Claim
+from rthstrack.virtual_test import true_tracking
 from tolerances import physical, round_off
 
 needs_records = pytest.mark.skipif(

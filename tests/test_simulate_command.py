@@ -23,7 +23,7 @@ from rthstrack.errors import RecordingError, SignalError, UnstableError
 from rthstrack.ground_motion import ground_motion_from, synthetic_ground_motion
 from rthstrack.recording import propose_pair, read_recording
 from rthstrack.run_file import read_run_test, write_run
-from rthstrack.simulate import (
+from rthstrack.virtual_test import (
     Actuator,
     Converter,
     DelayHistory,

@@ -13,8 +13,8 @@ import pytest
 
 from rthstrack.cli import main
 from rthstrack.ground_motion import synthetic_ground_motion
-from rthstrack.simulate import Actuator, ModalDamping, Run, Spring, Structure, VirtualTest, simulate
-from rthstrack.study import study
+from rthstrack.studies import study
+from rthstrack.virtual_test import Actuator, ModalDamping, Run, Spring, Structure, VirtualTest, simulate
 from tolerances import physical
 
 RATE = 200.0

@@ -1,13 +1,25 @@
 """Did the actuator do what the simulation asked?
 
-Frequency-domain evaluation of actuator tracking in real-time hybrid simulation, after Guo, Xu and Chen (2014).
+Frequency-domain evaluation of actuator tracking in real-time hybrid simulation, after Guo, Xu and Chen (2014), and
+virtual tests to rehearse it with, whose structures, restoring forces and actuators are in `rthstrack.virtual_test`.
 """
 
 from rthstrack._core import __version__
 from rthstrack.assessment import Assessment, Limits, assess
-from rthstrack.errors import ChannelError, RecordingError, RthstrackError, SettingError, SignalError
+from rthstrack.configuration import read_configuration
+from rthstrack.errors import (
+    ChannelError,
+    ConfigurationError,
+    RecordingError,
+    RthstrackError,
+    SettingError,
+    SignalError,
+    UnstableError,
+)
+from rthstrack.ground_motion import GroundMotion, list_records, read_ground_motion, record, synthetic_ground_motion
 from rthstrack.recording import Channel, Recording, propose_pair, read_recording
 from rthstrack.report import write_report
+from rthstrack.studies import Study, study
 from rthstrack.tracking import (
     Evaluator,
     FrequencyResponse,
@@ -22,13 +34,28 @@ from rthstrack.tracking import (
     index_histories,
     indices,
 )
+from rthstrack.virtual_test import (
+    CriticalDelay,
+    DelayDamping,
+    Run,
+    VirtualTest,
+    critical_delay,
+    delay_damping,
+    simulate,
+    simulate_many,
+    true_tracking,
+)
 
 __all__ = [
     "Assessment",
     "Channel",
     "ChannelError",
+    "ConfigurationError",
+    "CriticalDelay",
+    "DelayDamping",
     "Evaluator",
     "FrequencyResponse",
+    "GroundMotion",
     "IndexHistories",
     "Indices",
     "Limits",
@@ -36,18 +63,33 @@ __all__ = [
     "Recording",
     "RecordingError",
     "RthstrackError",
+    "Run",
     "SettingError",
     "Settings",
     "SignalError",
+    "Study",
     "Tracking",
+    "UnstableError",
+    "VirtualTest",
     "__version__",
     "assess",
+    "critical_delay",
+    "delay_damping",
     "evaluate",
     "evaluate_moving",
     "frequency_response",
     "index_histories",
     "indices",
+    "list_records",
     "propose_pair",
+    "read_configuration",
+    "read_ground_motion",
     "read_recording",
+    "record",
+    "simulate",
+    "simulate_many",
+    "study",
+    "synthetic_ground_motion",
+    "true_tracking",
     "write_report",
 ]

@@ -5,7 +5,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from rthstrack import simulate
+from rthstrack import virtual_test
 from rthstrack.tracking import Settings
 
 __all__ = [
@@ -46,7 +46,7 @@ _Structure = tuple[tuple[_Array, _Array, _Array, _Array] | None, _Mistakes]
 
 @final
 class VirtualTest:
-    def __new__(cls, test: simulate.VirtualTest) -> VirtualTest: ...
+    def __new__(cls, test: virtual_test.VirtualTest) -> VirtualTest: ...
     def run(
         self, ground: NDArray[Any], noise: list[list[float] | None]
     ) -> tuple[tuple[_Array, _Array, _Array, _Array, _Array, int, float] | None, tuple[float, float] | None]: ...
@@ -54,15 +54,15 @@ class VirtualTest:
     def delay_damping(self, delay_s: float) -> tuple[_Array, _Array, _Array, _Array]: ...
     def true_response(self, actuator: int, frequency_hz: NDArray[Any]) -> NDArray[np.complex128] | None: ...
 
-def check_test(test: simulate.VirtualTest) -> _Mistakes: ...
+def check_test(test: virtual_test.VirtualTest) -> _Mistakes: ...
 def sdof(frequency_hz: float, damping_ratio: float, mass_kg: float) -> _Structure: ...
 def shear_building(
-    masses_kg: list[float], stiffnesses: list[float], damped: simulate.ModalDamping | simulate.RayleighDamping
+    masses_kg: list[float], stiffnesses: list[float], damped: virtual_test.ModalDamping | virtual_test.RayleighDamping
 ) -> _Structure: ...
 def from_matrices(
     mass: NDArray[Any],
     stiffness: NDArray[Any],
-    damped: NDArray[Any] | simulate.ModalDamping | simulate.RayleighDamping,
+    damped: NDArray[Any] | virtual_test.ModalDamping | virtual_test.RayleighDamping,
     influence: list[float],
 ) -> _Structure: ...
 def evaluate_moving(

@@ -16,7 +16,7 @@ import numpy as np
 
 from rthstrack.errors import ConfigurationError
 from rthstrack.ground_motion import check_ground_motion
-from rthstrack.simulate import (
+from rthstrack.virtual_test import (
     Actuator,
     BaberWen,
     BoucWen,

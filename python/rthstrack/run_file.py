@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rthstrack.simulate import Run, VirtualTest
+    from rthstrack.virtual_test import Run, VirtualTest
 
 PROGRAM = "rthstrack"
 

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from rthstrack.study import Cell, Study
+    from rthstrack.studies import Cell, Study
 
 _COLOURS = (VALUE, MEASURED, SECOND, THIRD, "#e69f00", "#56b4e9", TARGET)
 _MARKERS = "os^Dvx+"

@@ -1,4 +1,4 @@
-//! Virtual tests: the classes of `rthstrack.simulate` to the core's, signals back.
+//! Virtual tests: the classes of `rthstrack.virtual_test` to the core's, signals back.
 
 use numpy::{Complex64, IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ndarray::Array2};
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -35,7 +35,7 @@ fn number(object: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
 }
 
 fn unknown(what: &str, name: &str) -> PyErr {
-    PyTypeError::new_err(format!("{name} is not a {what} of rthstrack.simulate"))
+    PyTypeError::new_err(format!("{name} is not a {what} of rthstrack.virtual_test"))
 }
 
 /// A law; `whole` is the stiffness meant by None.
@@ -156,7 +156,7 @@ fn actuator(object: &Bound<'_, PyAny>, structure: &Structure) -> PyResult<Actuat
     })
 }
 
-/// A damping of `rthstrack.simulate`, or a matrix.
+/// A damping of `rthstrack.virtual_test`, or a matrix.
 fn damping(object: &Bound<'_, PyAny>) -> PyResult<Damping> {
     let name = kind(object)?;
     Ok(match name.as_str() {
@@ -226,7 +226,7 @@ fn from_matrices<'py>(
     built(py, Structure::from_matrices(n, mass, stiffness, &damping(damped)?, Some(&influence)))
 }
 
-/// The core's configuration of a `rthstrack.simulate.VirtualTest`; its structure is checked already.
+/// The core's configuration of a `rthstrack.virtual_test.VirtualTest`; its structure is checked already.
 fn configuration(py: Python<'_>, test: &Bound<'_, PyAny>) -> PyResult<TestConfig> {
     let whole = test.getattr("structure")?;
     let matrix = |name: &str| -> PyResult<Vec<f64>> {
@@ -253,7 +253,7 @@ fn configuration(py: Python<'_>, test: &Bound<'_, PyAny>) -> PyResult<TestConfig
     })
 }
 
-/// Everything that is wrong with a `rthstrack.simulate.VirtualTest`.
+/// Everything that is wrong with a `rthstrack.virtual_test.VirtualTest`.
 #[pyfunction]
 fn check_test(py: Python<'_>, test: &Bound<'_, PyAny>) -> PyResult<Mistakes> {
     match rthstrack::dynamics::VirtualTest::new(configuration(py, test)?) {

@@ -14,7 +14,7 @@ from rthstrack.errors import SettingError
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from rthstrack.reproduce import Reproduction
+    from rthstrack.reproduction import Reproduction
 
 _DESCRIPTION = """\
 Runs the virtual tests of Guo, Xu and Chen (2014), Smart Structures and Systems 14(6), 1197-1220,
@@ -55,7 +55,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Reproduces the study; returns the exit status."""
-    from rthstrack.reproduce import reproduce
+    from rthstrack.reproduction import reproduce
 
     given: dict[str, Path] = {}
     for name, file in args.record:

@@ -15,14 +15,14 @@ from rthstrack.cli.evaluate import _path, _positive
 from rthstrack.configuration import read_configuration
 from rthstrack.errors import ConfigurationError, SettingError
 from rthstrack.ground_motion import ground_motion_from
-from rthstrack.simulate import delay_damping, simulate, true_tracking
+from rthstrack.virtual_test import delay_damping, simulate, true_tracking
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import NDArray
 
-    from rthstrack.simulate import Run
+    from rthstrack.virtual_test import Run
 
 # Frequencies listed of a structure with many.
 _MOST_MODES = 6

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from rthstrack.assessment import json_ready
 from rthstrack.cli.evaluate import _count, _not_negative, _number, _positive, _scale
 from rthstrack.errors import RthstrackError, SettingError
-from rthstrack.study import COMBINED, POWERS, WEIGHT_POWERS, WINDOWS, Pair, Study, StudySettings, read_pairs, study
+from rthstrack.studies import COMBINED, POWERS, WEIGHT_POWERS, WINDOWS, Pair, Study, StudySettings, read_pairs, study
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from rthstrack.study import Cell
+    from rthstrack.studies import Cell
 
 FAILED = 1
 _DESCRIPTION = """\

@@ -25,15 +25,15 @@ from rthstrack.errors import RecordingError, SettingError, SignalError
 from rthstrack.ground_motion import ground_motion_from
 from rthstrack.recording import propose_pair, read_recording
 from rthstrack.run_file import read_run_test
-from rthstrack.simulate import Run, simulate, true_tracking
 from rthstrack.tracking import Evaluator, Settings, Tracking, _count, _number, _Result, _single, evaluate
+from rthstrack.virtual_test import Run, simulate, true_tracking
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from numpy.typing import NDArray
 
-    from rthstrack.simulate import VirtualTest
+    from rthstrack.virtual_test import VirtualTest
 
 #: P and Q of the paper's sections 3 and 4, each with the other at 1.
 POWERS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)

@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
-from rthstrack.reproduce import CHEBYSHEV, LOWERED, SCIPY, SPECTRAL, TRANSFER, paper
-from rthstrack.reproduce.cases import CASES, OTHER_FREQUENCIES_HZ
-from rthstrack.reproduce.paper_form import largest_pole, order_of_matlab
-from rthstrack.simulate import BoucWen, FirstOrder
+from rthstrack.reproduction import CHEBYSHEV, LOWERED, SCIPY, SPECTRAL, TRANSFER, paper
+from rthstrack.reproduction.cases import CASES, OTHER_FREQUENCIES_HZ
+from rthstrack.reproduction.paper_form import largest_pole, order_of_matlab
 from rthstrack.tracking import evaluate
+from rthstrack.virtual_test import BoucWen, FirstOrder
 
 if TYPE_CHECKING:
-    from rthstrack.reproduce import Reproduction
-    from rthstrack.simulate import Run
+    from rthstrack.reproduction import Reproduction
+    from rthstrack.virtual_test import Run
 
 Verdict: TypeAlias = Literal["agrees", "does not agree", "cannot be compared"]
 

@@ -11,8 +11,8 @@ from typing import Literal, TypeAlias
 
 from rthstrack.errors import SettingError, UnstableError
 from rthstrack.ground_motion import GroundMotion, read_ground_motion, record
-from rthstrack.reproduce import paper
-from rthstrack.simulate import (
+from rthstrack.reproduction import paper
+from rthstrack.virtual_test import (
     Actuator,
     BoucWen,
     CriticalDelay,

@@ -16,13 +16,13 @@ import scipy
 from rthstrack._core import __version__
 from rthstrack.errors import RecordingError, SettingError
 from rthstrack.plots import _style
-from rthstrack.reproduce import figures, paper, tables
-from rthstrack.reproduce.claims import TERMS, Claim
+from rthstrack.reproduction import figures, paper, tables
+from rthstrack.reproduction.claims import TERMS, Claim
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from rthstrack.reproduce import Reproduction
+    from rthstrack.reproduction import Reproduction
 
 _CLAIM_COLUMNS = ("section", "statement", "printed", "ours", "verdict", "why")
 

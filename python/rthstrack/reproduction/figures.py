@@ -17,14 +17,14 @@ from matplotlib.figure import Figure
 
 from rthstrack import display
 from rthstrack.plots import DOUBLE_COLUMN_IN, MEASURED, MUTED, SECOND, TARGET, VALUE, _style
-from rthstrack.reproduce import CHEBYSHEV, LOWERED, SCIPY, SPECTRAL, TRANSFER, paper
-from rthstrack.reproduce.cases import CASES, Case
+from rthstrack.reproduction import CHEBYSHEV, LOWERED, SCIPY, SPECTRAL, TRANSFER, paper
+from rthstrack.reproduction.cases import CASES, Case
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from rthstrack.reproduce import Reproduction
+    from rthstrack.reproduction import Reproduction
 
 #: A history is drawn by the extremes of so many groups of neighbouring samples.
 _GROUPS = 1500

@@ -10,11 +10,11 @@ from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
 
 from rthstrack.plots import DOUBLE_COLUMN_IN, MUTED, _style
-from rthstrack.reproduce import CHEBYSHEV, SCIPY, SPECTRAL, paper
-from rthstrack.reproduce.cases import CASES
+from rthstrack.reproduction import CHEBYSHEV, SCIPY, SPECTRAL, paper
+from rthstrack.reproduction.cases import CASES
 
 if TYPE_CHECKING:
-    from rthstrack.reproduce import Reproduction
+    from rthstrack.reproduction import Reproduction
 
 #: The cases of each table; Table 3 was printed without Q = 1.
 TABLES = {

@@ -13,14 +13,23 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
-from rthstrack.reproduce import paper, paper_form
-from rthstrack.reproduce.cases import CASES, RecordFile, Trial, UsedRecord, choose_records, run_case, run_trial, trials
-from rthstrack.reproduce.paper_form import Reading
-from rthstrack.study import Cell, Study, study
+from rthstrack.reproduction import paper, paper_form
+from rthstrack.reproduction.cases import (
+    CASES,
+    RecordFile,
+    Trial,
+    UsedRecord,
+    choose_records,
+    run_case,
+    run_trial,
+    trials,
+)
+from rthstrack.reproduction.paper_form import Reading
+from rthstrack.studies import Cell, Study, study
 
 if TYPE_CHECKING:
-    from rthstrack.reproduce.claims import Claim
-    from rthstrack.simulate import Run
+    from rthstrack.reproduction.claims import Claim
+    from rthstrack.virtual_test import Run
 
 __all__ = ["Reproduction", "reproduce"]
 
@@ -72,7 +81,7 @@ class Reproduction:
     @property
     def claims(self) -> tuple[Claim, ...]:
         """Every quantitative statement of the paper, judged."""
-        from rthstrack.reproduce.claims import judge
+        from rthstrack.reproduction.claims import judge
 
         return judge(self)
 
@@ -93,7 +102,7 @@ def reproduce(
     begun = time.perf_counter()
     tell = progress or (lambda stage, done, total: None)
     if out is not None:
-        from rthstrack.reproduce.writing import prepare
+        from rthstrack.reproduction.writing import prepare
 
         prepare(Path(out))
     used = choose_records(records or {})
@@ -128,7 +137,7 @@ def reproduce(
         time.perf_counter() - begun,
     )
     if out is not None:
-        from rthstrack.reproduce.writing import write
+        from rthstrack.reproduction.writing import write
 
         write(result, Path(out), _stage(tell, "figures and tables"))
     return result
