@@ -311,18 +311,34 @@ class VirtualTest:
 
     def check(self) -> tuple[Mistake, ...]:
         """Everything that is wrong with it, each with its key: `actuator[1].delay_s`, numbered from 1."""
-        mistakes = [Mistake(*m) for m in _core.check_test(self)]
+        # The core counts without a sign, and knows two names.
+        mistakes = list(self._miscounted())
+        if self.stepping not in ("continuous", "cr"):
+            mistakes.append(Mistake("test.stepping", f"expected 'continuous' or 'cr', found {self.stepping!r}"))
+        if not mistakes:
+            mistakes += [Mistake(*m) for m in _core.check_test(self)]
         for i, actuator in enumerate(self.actuators, 1):
             for name in _CONVERTERS:
                 density, key = getattr(actuator, name).noise_density, f"actuator[{i}].{name}.noise_density"
-                if not (math.isfinite(density) and density >= 0):
-                    mistakes.append(Mistake(key, f"expected a number of at least 0, found {density}"))
+                if not 0 <= density <= 1e30:
+                    mistakes.append(Mistake(key, f"expected a number from 0 to 1e30, found {density}"))
                 elif density and self.stepping == "continuous" and name != "displacement_sensor":
                     what = "expected 0 with test.stepping = 'continuous', whose loop is not sampled"
                     mistakes.append(Mistake(key, f"{what}, found {density}"))
         if self.seed < 0:
             mistakes.append(Mistake("test.seed", f"expected a whole number of at least 0, found {self.seed}"))
         return tuple(mistakes)
+
+    def _miscounted(self) -> Iterator[Mistake]:
+        for what, items in (("element", self.elements), ("actuator", self.actuators)):
+            for i, item in enumerate(items, 1):
+                for name in ("dof", "from_dof", "force_delay_samples"):
+                    found = getattr(item, name, 0)
+                    if found < 0:
+                        yield Mistake(f"{what}[{i}].{name}", f"expected a whole number of at least 0, found {found}")
+                order = getattr(getattr(item, "compensation", None), "order", 1)
+                if order < 0:
+                    yield Mistake(f"{what}[{i}].compensation.order", f"expected 1, 2 or 3, found {order}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -391,10 +407,11 @@ def simulate(
     round(duration_s rate) + 1 samples, by default as long as the record. `seed` is `test.seed` unless given.
     Raises ConfigurationError with every mistake, UnstableError with the time at which a displacement left its bound.
     """
+    test = test if seed is None else replace(test, seed=seed)
     plan = _plan(test)
     ground = ground_motion.resampled(test.rate_hz, duration_s)
     acceleration = np.ascontiguousarray(ground.acceleration_m_s2)
-    signals, left = plan.run(acceleration, _noise(test, len(acceleration), seed))
+    signals, left = plan.run(acceleration, _noise(test, len(acceleration)))
     critical = CriticalDelay(*plan.critical_delay()) if len(test.actuators) == 1 else None
     if signals is None:
         time_s, bound_m = left or (math.nan, math.nan)
@@ -406,7 +423,7 @@ def simulate(
         array.flags.writeable = False
     target, command, measured, force = (c[:, 0] if c.shape[1] == 1 else c for c in channels)
     return Run(
-        test if seed is None else replace(test, seed=seed),
+        test,
         test.rate_hz,
         target,
         command,
@@ -469,6 +486,10 @@ def true_tracking(
     """
     plan = _plan(test)
     frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
+    if not 0 <= actuator < len(test.actuators):
+        raise SettingError(f"actuator: expected a number from 0 to {len(test.actuators) - 1}, found {actuator}")
+    if not (np.isfinite(frequency) & (frequency >= 0)).all():
+        raise SettingError(f"frequency_hz: expected finite frequencies of at least 0, found {frequency_hz!r}")
     model = test.actuators[actuator]
     # Unwrapped along a grid that is fine for every delay in play.
     top = max(float(frequency.max(initial=0.0)), 1e-9)
@@ -499,9 +520,9 @@ def _plan(test: VirtualTest) -> _core.VirtualTest:
     return _core.VirtualTest(test)
 
 
-def _noise(test: VirtualTest, n_samples: int, seed: int | None) -> list[list[float] | None]:
+def _noise(test: VirtualTest, n_samples: int) -> list[list[float] | None]:
     """One stream of its own for each noisy channel, so that adding one leaves the others as they were."""
-    streams = np.random.SeedSequence(test.seed if seed is None else seed).spawn(3 * len(test.actuators))
+    streams = np.random.SeedSequence(test.seed).spawn(3 * len(test.actuators))
     noise: list[list[float] | None] = []
     for actuator in test.actuators:
         for name in _CONVERTERS:

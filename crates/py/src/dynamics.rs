@@ -167,10 +167,12 @@ fn damping(object: &Bound<'_, PyAny>) -> PyResult<Damping> {
                 Err(_) => ratios.extract()?,
             })
         }
-        "RayleighDamping" => Damping::Rayleigh {
-            ratios: object.getattr("ratios")?.extract()?,
-            modes: object.getattr("modes")?.extract()?,
-        },
+        "RayleighDamping" => {
+            let modes: [i64; 2] = object.getattr("modes")?.extract()?;
+            // There is no mode 0 either.
+            let modes = modes.map(|m| usize::try_from(m).unwrap_or(0));
+            Damping::Rayleigh { ratios: object.getattr("ratios")?.extract()?, modes }
+        }
         _ => Damping::Matrix(object.extract::<PyReadonlyArray2<'_, f64>>()?.as_slice().map_err(contiguous)?.to_vec()),
     })
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::check::{Checks, nonnegative, positive};
+use super::check::{Checks, LEAST, MOST, nonnegative, positive};
 use super::compensator::Compensation;
 use super::history::{History, Motion};
 use super::law::{Law, Memory};
@@ -11,6 +11,8 @@ use super::law::{Law, Memory};
 pub const MAX_ORDER: usize = 16;
 /// Internal Runge-Kutta steps of a servo-hydraulic plant: no longer than this over its fastest pole.
 const PACE: f64 = 0.25;
+/// The fastest pole that is followed, in radians a sample.
+const MAX_PACE: f64 = 250.0;
 
 /// How long the actuator lags.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,6 +43,12 @@ impl Delay {
                 (delay_s[after - 1] + slope * (time - time_s[after - 1]), slope)
             }
         }
+    }
+
+    /// A history that stands still is a constant.
+    pub(crate) fn plain(self) -> Self {
+        let (low, high) = self.range();
+        if low == high { Delay::Constant(low) } else { self }
     }
 
     /// The shortest and the longest.
@@ -163,7 +171,7 @@ impl Converter {
     }
 
     fn check(&self, checks: &mut Checks) {
-        checks.demand("limit", self.limit > 0.0, "a positive number", self.limit);
+        checks.demand("limit", self.limit >= LEAST, "a positive number", self.limit);
         nonnegative(checks, "quantum", self.quantum);
     }
 }
@@ -219,11 +227,13 @@ impl Actuator {
     pub(crate) fn check(&self, checks: &mut Checks, sampled: bool, rate_hz: f64) {
         checks.demand("specimen", !self.specimen.is_empty(), "at least one restoring force", "none");
         for (i, law) in self.specimen.iter().enumerate() {
-            let key = if self.specimen.len() == 1 { "specimen".into() } else { format!("specimen[{}]", i + 1) };
-            checks.under(&key, |c| law.check(c));
+            checks.under(&self.specimen_key(i), |c| law.check(c));
         }
         nonnegative(checks, "specimen_mass_kg", self.specimen_mass);
-        checks.demand("gain", self.gain.is_finite() && self.gain != 0.0, "a finite number other than 0", self.gain);
+        let size = (LEAST..=MOST).contains(&self.gain.abs());
+        let usual = self.gain == 0.0 || !self.gain.is_finite();
+        let expected = if usual { "a finite number other than 0" } else { "a size between 1e-30 and 1e30" };
+        checks.demand("gain", size, expected, self.gain);
         self.delay.check(checks);
         checks.under("command_converter", |c| self.command_converter.check(c));
         checks.under("displacement_sensor", |c| self.displacement_sensor.check(c));
@@ -253,11 +263,12 @@ impl Actuator {
         checks.under("dynamics", |checks| match &self.dynamics {
             Dynamics::None => {}
             Dynamics::FirstOrder { alpha } => {
-                checks.demand("alpha", alpha.is_finite() && *alpha >= 1.0, "a number of samples of at least 1", alpha);
+                checks.demand("alpha", (1.0..=1e6).contains(alpha), "a number of samples from 1 to 1e6", alpha);
             }
             Dynamics::TransferFunction { numerator, denominator } => {
-                let finite = numerator.iter().chain(denominator).all(|v| v.is_finite());
-                checks.demand("denominator", finite, "finite coefficients", "NaN or infinity");
+                let sound = |v: &f64| *v == 0.0 || (LEAST..=MOST).contains(&v.abs());
+                let finite = numerator.iter().chain(denominator).all(sound);
+                checks.demand("denominator", finite, "finite coefficients (0, or 1e-30 to 1e30 in size)", "others");
                 let leads = denominator.first().is_some_and(|v| *v != 0.0);
                 checks.demand("denominator", leads, "a first coefficient other than 0", format!("{denominator:?}"));
                 checks.demand(
@@ -274,13 +285,18 @@ impl Actuator {
                     numerator.len(),
                 );
                 if finite && leads && proper && denominator.len() <= MAX_ORDER + 1 {
-                    let poles = StateSpace::of(numerator, denominator).poles();
-                    let unstable = poles.iter().find(|p| p.re >= 0.0);
-                    if let Some(pole) = unstable {
-                        checks.mistake(
-                            "denominator",
-                            format!("expected poles left of the imaginary axis, found {pole} rad/s"),
-                        );
+                    match StateSpace::of(numerator, denominator).poles() {
+                        None => checks.mistake("denominator", "expected a polynomial whose roots can be found"),
+                        Some(poles) => {
+                            if let Some(pole) = poles.iter().find(|p| p.re >= 0.0) {
+                                let expected = "expected poles left of the imaginary axis";
+                                checks.mistake("denominator", format!("{expected}, found {pole} rad/s"));
+                            } else if let Some(pole) = poles.iter().find(|p| p.norm() > MAX_PACE * rate_hz) {
+                                let expected =
+                                    format!("poles of at most {:.6e} rad/s at this rate", MAX_PACE * rate_hz);
+                                checks.demand("denominator", false, &expected, pole);
+                            }
+                        }
                     }
                 }
             }
@@ -294,7 +310,29 @@ impl Actuator {
         });
         if let Dynamics::ServoHydraulic(_) = self.dynamics {
             positive(checks, "specimen_mass_kg", self.specimen_mass);
+            let pace = self.fastest_pole().map(|pole| pole / rate_hz);
+            if checks.mistakes.is_empty() && pace.is_none_or(|pace| pace > MAX_PACE) {
+                checks.mistake(
+                    "specimen_mass_kg",
+                    "expected a mass that this plant and rate can follow, found too little",
+                );
+            }
         }
+        if sampled {
+            for (i, law) in self.specimen.iter().enumerate() {
+                checks.under(&self.specimen_key(i), |c| law.check_rate(c, rate_hz));
+            }
+        }
+    }
+
+    fn specimen_key(&self, i: usize) -> String {
+        if self.specimen.len() == 1 { "specimen".into() } else { format!("specimen[{}]", i + 1) }
+    }
+
+    /// The fastest pole of the dynamics, elastic, rad/s; None where it cannot be found.
+    pub(crate) fn fastest_pole(&self) -> Option<f64> {
+        let Some(system) = self.linear_dynamics(true) else { return Some(0.0) };
+        Some(system.poles()?.iter().map(|p| p.norm()).fold(0.0, f64::max))
     }
 
     /// The servo-hydraulic plant, or the transfer function, as one linear system; None where there is none, or where the
@@ -384,8 +422,9 @@ impl StateSpace {
         self.b.len()
     }
 
-    pub(crate) fn poles(&self) -> Vec<Complex<f64>> {
-        if self.order() == 0 { Vec::new() } else { eigenvalues(&self.a) }
+    /// None where they cannot be found.
+    pub(crate) fn poles(&self) -> Option<Vec<Complex<f64>>> {
+        if self.order() == 0 { Some(Vec::new()) } else { eigenvalues(&self.a) }
     }
 
     /// y / u at s.
@@ -427,11 +466,16 @@ pub(crate) fn solve_response(
     solved.iter().zip(c.iter()).map(|(x, c)| x * *c).sum::<Complex<f64>>() + d
 }
 
-/// Eigenvalues of a general real matrix, balanced first.
-pub(crate) fn eigenvalues(matrix: &DMatrix<f64>) -> Vec<Complex<f64>> {
+/// Eigenvalues of a general real matrix, balanced first; None where the iteration does not end.
+pub(crate) fn eigenvalues(matrix: &DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
+    // Squares that leave double precision would keep the balancing from ending.
+    if !matrix.iter().all(|v| v.abs() < 1e140) {
+        return None;
+    }
     let mut balanced = matrix.clone();
     nalgebra::linalg::balancing::balance_parlett_reinsch(&mut balanced);
-    balanced.complex_eigenvalues().iter().copied().collect()
+    let schur = nalgebra::Schur::try_new(balanced, f64::EPSILON, 10_000)?;
+    Some(schur.complex_eigenvalues().iter().copied().collect())
 }
 
 /// The plan of an actuator that is moved once a sample, as a controller's computer does.
@@ -440,6 +484,8 @@ pub struct SampledActuator {
     actuator: Actuator,
     rate_hz: f64,
     kind: Kind,
+    /// Of each law's memory.
+    limits: Vec<f64>,
 }
 
 #[derive(Debug, Clone)]
@@ -474,12 +520,12 @@ impl SampledActuator {
                 Kind::Linear { held: (super::structure::rows(&a), b.as_slice().to_vec()), system }
             }
             Dynamics::ServoHydraulic(servo) => {
-                let poles = actuator.linear_dynamics(true).map(|s| s.poles()).unwrap_or_default();
-                let fastest = poles.iter().map(|p| p.norm()).fold(0.0, f64::max);
+                let fastest = actuator.fastest_pole().unwrap_or(0.0);
                 Kind::Servo { servo: *servo, n_steps: (fastest / rate_hz / PACE).ceil().max(1.0) as usize }
             }
         };
-        Self { actuator: actuator.clone(), rate_hz, kind }
+        let limits = actuator.specimen.iter().map(Law::limit).collect();
+        Self { actuator: actuator.clone(), rate_hz, kind, limits }
     }
 
     /// The plan of an actuator on its own, for a program that steps it.
@@ -537,8 +583,8 @@ impl SampledActuator {
         let acceleration = (motion.velocity - before.velocity) * self.rate_hz;
         let motion = Motion { acceleration, ..motion };
         let mut force = self.actuator.specimen_mass * acceleration;
-        for (law, memory) in self.actuator.specimen.iter().zip(&mut state.memory) {
-            law.advance(before.displacement, motion.displacement, dt, memory);
+        for ((law, memory), limit) in self.actuator.specimen.iter().zip(&mut state.memory).zip(&self.limits) {
+            law.advance(before.displacement, motion.displacement, dt, memory, *limit);
             force += law.force(motion.displacement, motion.velocity, memory);
         }
         state.motion = motion;
@@ -597,6 +643,7 @@ impl SampledActuator {
             for i in 0..n {
                 w[i] += h / 6.0 * (k[i] + 2.0 * (k[n + i] + k[2 * n + i]) + k[3 * n + i]);
             }
+            hold(&mut w[5..], &self.limits);
         }
         let w = &state.dynamics;
         let restoring = servo_rate(actuator, servo, w, held, &mut k[..n]);
@@ -628,6 +675,14 @@ impl SampledActuator {
             }
         };
         Some(rest)
+    }
+}
+
+/// Keeps memories, two places a law, within their limits.
+#[inline]
+fn hold(memories: &mut [f64], limits: &[f64]) {
+    for (memory, limit) in memories.chunks_exact_mut(2).zip(limits) {
+        memory[0] = memory[0].clamp(-limit, *limit);
     }
 }
 

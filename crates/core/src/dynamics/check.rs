@@ -46,10 +46,17 @@ impl Checks {
     }
 }
 
+/// Numbers beyond these are no laboratory's, and their products would leave double precision.
+pub(crate) const LEAST: f64 = 1e-30;
+pub(crate) const MOST: f64 = 1e30;
+pub(crate) const RANGE: &str = "a number between 1e-30 and 1e30";
+
 pub(crate) fn positive(checks: &mut Checks, key: &str, found: f64) {
-    checks.demand(key, found.is_finite() && found > 0.0, "a positive number", found);
+    let expected = if found > 0.0 { RANGE } else { "a positive number" };
+    checks.demand(key, (LEAST..=MOST).contains(&found), expected, found);
 }
 
 pub(crate) fn nonnegative(checks: &mut Checks, key: &str, found: f64) {
-    checks.demand(key, found.is_finite() && found >= 0.0, "a number of at least 0", found);
+    let sound = found == 0.0 || (LEAST..=MOST).contains(&found);
+    checks.demand(key, sound, if found > 0.0 { RANGE } else { "a number of at least 0" }, found);
 }

@@ -55,14 +55,14 @@ impl Compensation {
         match self {
             Compensation::None => {}
             Compensation::Inverse { alpha } => {
-                checks.demand("alpha", alpha.is_finite() && *alpha >= 1.0, "a number of samples of at least 1", alpha);
+                checks.demand("alpha", (1.0..=1e6).contains(alpha), "a number of samples from 1 to 1e6", alpha);
             }
             Compensation::Extrapolation { order, delay_s } => {
                 checks.demand("order", (1..=3).contains(order), "1, 2 or 3", order);
                 positive(checks, "delay_s", *delay_s);
                 checks.demand(
                     "delay_s",
-                    delay_s * rate_hz <= 1e6 || !delay_s.is_finite(),
+                    delay_s * rate_hz <= 1e6 || !(delay_s * rate_hz).is_finite(),
                     "at most a million samples",
                     delay_s,
                 );

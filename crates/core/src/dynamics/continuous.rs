@@ -22,9 +22,10 @@ const PACE: f64 = 0.5;
 /// Delays shorter than a sample over this are looked up within the step, by a Taylor series whose remainder is of the
 /// order (omega tau)^3 / 6.
 const SHORTEST: f64 = 64.0;
-/// Most halvings, and most steps a sample to begin with.
+/// Most halvings, most steps a sample to begin with, and most steps in all after which halving ends.
 const MAX_HALVINGS: usize = 6;
-const MAX_STEPS: f64 = 4096.0;
+const MAX_STEPS: f64 = 1024.0;
+const ENOUGH: usize = 1 << 27;
 
 pub(crate) fn run(test: &VirtualTest, ground: &[f64], noise: &Noise, bound: f64) -> Result<Run> {
     let mut steps = first_steps(test)?;
@@ -43,7 +44,7 @@ pub(crate) fn run(test: &VirtualTest, ground: &[f64], noise: &Noise, bound: f64)
             _ => false,
         };
         coarse = fine;
-        if settled {
+        if settled || steps * ground.len() > ENOUGH {
             break;
         }
     }
@@ -65,8 +66,7 @@ fn first_steps(test: &VirtualTest) -> Result<usize> {
         test.config.actuators.iter().flat_map(|a| &a.specimen).chain(test.config.elements.iter().map(|e| &e.law));
     rate = laws.map(Law::relaxation_rate).fold(rate, f64::max);
     for actuator in &test.config.actuators {
-        let poles = actuator.linear_dynamics(true).map(|s| s.poles()).unwrap_or_default();
-        rate = poles.iter().map(|p| p.norm()).fold(rate, f64::max);
+        rate = rate.max(actuator.fastest_pole().unwrap_or(0.0));
     }
     let mut steps = (rate * dt / PACE).ceil().max(1.0);
     for actuator in &test.config.actuators {
@@ -75,7 +75,7 @@ fn first_steps(test: &VirtualTest) -> Result<usize> {
             steps = steps.max((dt / shortest).ceil());
         }
     }
-    if steps > MAX_STEPS {
+    if steps > MAX_STEPS || steps.is_nan() {
         let message = format!(
             "expected at least {:.0} Hz for the fastest mode, pole or relaxation, found {}",
             rate / PACE / MAX_STEPS,
@@ -114,7 +114,7 @@ enum Lookup {
     Past(Motion),
     /// Within the step, so short before the stage that its own motion tells: the delay, and the acceleration over it.
     Inside(f64, f64),
-    /// No delay.
+    /// No delay, ever.
     Now,
 }
 
@@ -124,6 +124,9 @@ struct Rig {
     taps: Option<[Tap; 2]>,
     /// Whether anything behind the delay feels its acceleration.
     heavy: bool,
+    /// Whether there is no delay, so that the specimen's mass moves with the structure's, and how much of it.
+    instant: bool,
+    inertia: f64,
     /// What it finds at the end of a step, and so at the start of the next.
     ahead: Motion,
     lookup: Lookup,
@@ -147,6 +150,9 @@ struct Equations<'a> {
     elements: usize,
     force: Vec<f64>,
     len: usize,
+    /// Where each law's memory lies, and its limit.
+    places: Vec<usize>,
+    limits: Vec<f64>,
 }
 
 impl<'a> Equations<'a> {
@@ -162,14 +168,9 @@ impl<'a> Equations<'a> {
             };
             let servo = matches!(actuator.dynamics, Dynamics::ServoHydraulic(_));
             let through = if servo { 0.0 } else { system.as_ref().map_or(1.0, |s| s.d) };
-            if actuator.delay == Delay::Constant(0.0) {
-                add_across(
-                    &mut mass,
-                    actuator.dof,
-                    actuator.from_dof,
-                    actuator.gain * through * actuator.specimen_mass,
-                );
-            }
+            let instant = actuator.delay == Delay::Constant(0.0);
+            let inertia = if instant { actuator.gain * through * actuator.specimen_mass } else { 0.0 };
+            add_across(&mut mass, actuator.dof, actuator.from_dof, inertia);
             let dynamics = len;
             len += if servo { 5 + 2 * actuator.specimen.len() } else { system.as_ref().map_or(0, StateSpace::order) };
             let memory = len;
@@ -186,6 +187,8 @@ impl<'a> Equations<'a> {
                 history: History::new(actuator.delay.range().1 / step_s, step_s),
                 taps,
                 heavy: actuator.specimen_mass > 0.0 || system.is_some(),
+                instant,
+                inertia,
                 ahead: Motion::default(),
                 lookup: Lookup::Now,
                 pace: 1.0,
@@ -197,12 +200,21 @@ impl<'a> Equations<'a> {
         }
         let elements = len;
         len += 2 * test.config.elements.len();
+        let (mut places, mut limits) = (Vec::new(), Vec::new());
+        for (actuator, rig) in test.config.actuators.iter().zip(&rigs) {
+            let servo = matches!(actuator.dynamics, Dynamics::ServoHydraulic(_));
+            let start = if servo { rig.dynamics + 5 } else { rig.memory };
+            places.extend((0..actuator.specimen.len()).map(|i| start + 2 * i));
+            limits.extend(actuator.specimen.iter().map(Law::limit));
+        }
+        places.extend((0..test.config.elements.len()).map(|i| elements + 2 * i));
+        limits.extend(test.config.elements.iter().map(|e| e.law.limit()));
         let some = |matrix: &DMatrix<f64>| (matrix.amax() > 0.0).then(|| rows(matrix));
         let inverse = mass.try_inverse().filter(|m| m.iter().all(|v| v.is_finite()));
         let inverse =
             rows(&inverse.ok_or_else(|| configuration("structure.mass_kg", "expected a matrix that can be inverted"))?);
         let (damping, stiffness) = (some(&test.numerical.damping), some(&test.numerical.stiffness));
-        Ok(Self { test, n, inverse, damping, stiffness, rigs, elements, force: vec![0.0; n], len })
+        Ok(Self { test, n, inverse, damping, stiffness, rigs, elements, force: vec![0.0; n], len, places, limits })
     }
 
     /// Finds each actuator's delayed target for the stage at `reach` (0, 1/2, 1) of the step that begins at `time`.
@@ -219,7 +231,7 @@ impl<'a> Equations<'a> {
             let (delay, slope) = actuator.delay.at(time + reach * h);
             rig.pace = 1.0 - slope;
             let steps = delay / h - reach;
-            rig.lookup = if delay == 0.0 {
+            rig.lookup = if rig.instant {
                 Lookup::Now
             } else if steps >= 0.0 {
                 Lookup::Past(rig.history.behind(steps, reach == 0.0))
@@ -321,6 +333,23 @@ impl<'a> Equations<'a> {
             super::sampled::multiply(&self.inverse, force, &mut out[n..2 * n]);
         }
         self.force = several;
+        for (rig, actuator) in self.rigs.iter_mut().zip(&self.test.config.actuators) {
+            if rig.inertia != 0.0 {
+                rig.seen.force += rig.inertia * place::<ONE>(actuator, &out[n..2 * n]);
+            }
+        }
+    }
+
+    /// Keeps each law's memory within its limit after a step.
+    #[inline(always)]
+    fn hold<const ONE: bool>(&self, y: &mut [f64]) {
+        if ONE {
+            y[2] = y[2].clamp(-self.limits[0], self.limits[0]);
+            return;
+        }
+        for (place, limit) in self.places.iter().zip(&self.limits) {
+            y[*place] = y[*place].clamp(-limit, *limit);
+        }
     }
 }
 
@@ -433,6 +462,7 @@ fn stepped<const ONE: bool, S: Clone + AsRef<[[f64; 4]]> + AsMut<[[f64; 4]]>>(
             equations.look(time, 1.0, h);
             equations.rate::<ONE>(at + slope, ahead.as_ref().as_flattened(), k.as_mut().as_flattened_mut());
             combine(y.as_mut(), total.as_ref(), k.as_ref(), |total, k| total + h / 6.0 * k);
+            equations.hold::<ONE>(y.as_mut().as_flattened_mut());
         }
     }
     Ok(run)

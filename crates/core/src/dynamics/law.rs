@@ -5,6 +5,9 @@ use super::check::{Checks, nonnegative, positive};
 /// What a law remembers of its past: z of Bouc-Wen and its dissipated energy, or the force of a Maxwell element.
 pub type Memory = [f64; 2];
 
+/// Most internal steps a sample.
+const MAX_STEPS: f64 = 1e3;
+
 /// A restoring force r(x, x'), in newtons, of displacement in metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Law {
@@ -70,6 +73,8 @@ impl BoucWen {
         let pace = velocity / self.yield_displacement;
         let size = z.abs();
         let power = if self.exponent == 2.0 { size * size } else { size.powf(self.exponent) };
+        // Beyond its limit z is a stage's overshoot: a power of it would only send the next stage further.
+        let power = power.min(1.0 / (self.beta + self.gamma));
         pace - nu * power * (self.gamma * pace.abs().copysign(z) + self.beta * pace)
     }
 
@@ -92,6 +97,8 @@ impl BoucWen {
             checks.demand(key, value.is_finite(), "a finite number", value);
         }
         let sum = self.beta + self.gamma;
+        let unloads = !(self.gamma < 0.0 && sum > 0.0);
+        checks.demand("gamma", unloads, "a number of at least 0, or z has no bound when it unloads", self.gamma);
         checks.demand(
             "gamma",
             sum > 0.0 || !sum.is_finite(),
@@ -132,18 +139,19 @@ impl Law {
     }
 
     /// The memory after moving from one displacement to another in `dt` at constant velocity: Runge-Kutta of fourth order
-    /// over steps no longer than a tenth of the yield displacement or half the relaxation time.
+    /// over steps no longer than a tenth of the yield displacement (less for a sharp yield point) or half the relaxation
+    /// time. `limit` is [`Law::limit`], which takes a power and is planned for that.
     #[inline]
-    pub fn advance(&self, from: f64, to: f64, dt: f64, memory: &mut Memory) {
+    pub fn advance(&self, from: f64, to: f64, dt: f64, memory: &mut Memory, limit: f64) {
         let pace = match self {
             Law::Spring { .. } | Law::Dashpot { .. } | Law::KelvinVoigt { .. } => return,
             Law::Maxwell { stiffness, damping } => 2.0 * dt * stiffness / damping,
             Law::BoucWen(law) | Law::BaberWen { hysteresis: law, .. } => {
-                10.0 * (to - from).abs() / law.yield_displacement
+                10.0 * (0.25 * law.exponent).max(1.0) * (to - from).abs() / law.yield_displacement
             }
         };
         // A motion without end is stopped by the test's bound, not here.
-        let n_steps = if pace < 1.0 { 1.0 } else { pace.ceil().min(1e4) };
+        let n_steps = if pace < 1.0 { 1.0 } else { pace.ceil().min(MAX_STEPS) };
         let (velocity, h) = ((to - from) / dt, dt / n_steps);
         for _ in 0..n_steps as usize {
             let ahead = |slope: &Memory, h: f64| [memory[0] + h * slope[0], memory[1] + h * slope[1]];
@@ -154,6 +162,17 @@ impl Law {
             for i in 0..2 {
                 memory[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
             }
+            memory[0] = memory[0].clamp(-limit, limit);
+        }
+    }
+
+    /// The largest |z|, (beta + gamma)^(-1/q), which no motion exceeds; infinite where there is none.
+    pub fn limit(&self) -> f64 {
+        match self {
+            Law::BoucWen(law) | Law::BaberWen { hysteresis: law, .. } => {
+                (law.beta + law.gamma).powf(-1.0 / law.exponent)
+            }
+            _ => f64::INFINITY,
         }
     }
 
@@ -185,6 +204,18 @@ impl Law {
             Law::Maxwell { stiffness, damping } => stiffness / damping,
             _ => 0.0,
         }
+    }
+
+    /// Whether a loop of this rate can follow the memory.
+    pub(crate) fn check_rate(&self, checks: &mut Checks, rate_hz: f64) {
+        let most = rate_hz * MAX_STEPS / 2.0;
+        let expected = format!("at least {:.6e} for this stiffness and rate", self.elastic() / most);
+        checks.demand("damping_n_s_per_m", self.relaxation_rate() <= most, &expected, "a faster relaxation");
+    }
+
+    /// k of the spring that moves at once.
+    fn elastic(&self) -> f64 {
+        if let Law::Maxwell { stiffness, .. } = self { *stiffness } else { self.elastic_stiffness() }
     }
 
     pub(crate) fn check(&self, checks: &mut Checks) {

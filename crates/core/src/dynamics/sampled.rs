@@ -57,6 +57,9 @@ struct Rig {
     compensator: CompensatorState,
     velocity: f64,
     measured: f64,
+    felt: f64,
+    /// Where the specimen really is.
+    moved: f64,
     /// Forces on their way to the computer, oldest next.
     late: Vec<f64>,
 }
@@ -82,16 +85,19 @@ pub(crate) fn run(test: &VirtualTest, ground: &[f64], noise: &Noise, bound: f64)
                 compensator: actuator.compensation.state(rate),
                 velocity: 0.0,
                 measured: 0.0,
+                felt: 0.0,
+                moved: 0.0,
                 late: vec![0.0; actuator.force_delay_samples],
             }
         })
         .collect();
     let mut memories: Vec<Memory> = vec![[0.0; 2]; config.elements.len()];
     let mut places = vec![0.0; config.elements.len()];
+    let limits: Vec<f64> = config.elements.iter().map(|e| e.law.limit()).collect();
     let (mut x, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
     let (mut force, mut scratch) = (vec![0.0; n], vec![0.0; n]);
     let mut run = Run::sized(rigs.len(), n, ground.len(), 1);
-    let heard = |channel: usize, sample: usize| noise.get(channel).and_then(Option::as_ref).map_or(0.0, |n| n[sample]);
+    let noisy = |channel: usize, sample: usize| noise.get(channel).and_then(Option::as_ref).map_or(0.0, |n| n[sample]);
 
     for sample in 0..ground.len() {
         if sample > 0 {
@@ -108,9 +114,11 @@ pub(crate) fn run(test: &VirtualTest, ground: &[f64], noise: &Noise, bound: f64)
             multiply(&stiffness, &x, &mut scratch);
             force.iter_mut().zip(&scratch).for_each(|(f, s)| *f -= s);
         }
-        for ((element, memory), place) in config.elements.iter().zip(&mut memories).zip(&mut places) {
+        for (((element, memory), place), limit) in
+            config.elements.iter().zip(&mut memories).zip(&mut places).zip(&limits)
+        {
             let to = element.across(&x);
-            element.law.advance(*place, to, dt, memory);
+            element.law.advance(*place, to, dt, memory, *limit);
             *place = to;
             across_add(&mut force, element.dof, element.from_dof, -element.law.force(to, element.across(&v), memory));
         }
@@ -120,14 +128,15 @@ pub(crate) fn run(test: &VirtualTest, ground: &[f64], noise: &Noise, bound: f64)
                 Motion { displacement: actuator.across(&x), velocity, acceleration: (velocity - rig.velocity) * rate };
             rig.velocity = velocity;
             let mut command = actuator.compensation.step(&mut rig.compensator, target, rate, rig.measured);
-            let sent = actuator.command_converter.convert(command.displacement + heard(3 * i, sample));
+            let sent = actuator.command_converter.convert(command.displacement + noisy(3 * i, sample));
             if sent.abs() >= actuator.command_converter.limit {
                 command.velocity = 0.0;
             }
             command.displacement = sent;
             let (motion, answer) = rig.plan.step(&mut rig.state, command);
-            rig.measured = actuator.displacement_sensor.convert(motion.displacement + heard(3 * i + 1, sample));
-            let felt = actuator.force_sensor.convert(answer + heard(3 * i + 2, sample));
+            rig.measured = actuator.displacement_sensor.convert(motion.displacement + noisy(3 * i + 1, sample));
+            let felt = actuator.force_sensor.convert(answer + noisy(3 * i + 2, sample));
+            (rig.felt, rig.moved) = (felt, motion.displacement);
             run.target[i][sample] = target.displacement;
             run.command[i][sample] = sent;
             run.measured[i][sample] = rig.measured;
@@ -145,7 +154,8 @@ pub(crate) fn run(test: &VirtualTest, ground: &[f64], noise: &Noise, bound: f64)
             run.displacement[i][sample] = x[i];
             within &= x[i].abs() <= bound && a[i].is_finite();
         }
-        if !within || !rigs.iter().all(|rig| rig.measured.abs() <= bound) {
+        let heard = |rig: &Rig| rig.moved.abs() <= bound && rig.measured.is_finite() && rig.felt.is_finite();
+        if !within || !rigs.iter().all(heard) {
             return Err(Error::Unstable { time_s: sample as f64 * dt, bound_m: bound });
         }
     }

@@ -151,11 +151,13 @@ impl Loop {
         }
         let closed = &open.a - &open.b * open.c.transpose() / (1.0 + open.d);
         let slow = |p: &Complex<f64>| p.re > -1e-10 * p.norm().max(1e-12);
-        if let Some(root) = eigenvalues(&closed).iter().find(|p| slow(p) && p.im >= 0.0) {
+        let unsolved =
+            || configuration("structure", "expected a loop whose roots can be found: are its numbers of one size?");
+        if let Some(root) = eigenvalues(&closed).ok_or_else(unsolved)?.iter().find(|p| slow(p) && p.im >= 0.0) {
             return Ok(found(0.0, root.im / (2.0 * PI)));
         }
         let mut least = found(f64::INFINITY, f64::NAN);
-        for omega in crossings(&open) {
+        for omega in crossings(&open).ok_or_else(unsolved)? {
             let mut angle = (open.response(Complex::new(0.0, omega)).arg() + PI).rem_euclid(2.0 * PI);
             if angle > 2.0 * PI - ANGLE {
                 angle = 0.0;
@@ -256,7 +258,7 @@ impl Loop {
 }
 
 /// Every omega > 0 with |C (j omega - A)^-1 B + D| = 1.
-fn crossings(open: &StateSpace) -> Vec<f64> {
+fn crossings(open: &StateSpace) -> Option<Vec<f64>> {
     let StateSpace { a, b, c, d } = open;
     let n = b.len();
     let r = 1.0 - d * d;
@@ -268,7 +270,7 @@ fn crossings(open: &StateSpace) -> Vec<f64> {
     hamiltonian.view_mut((n, n), (n, n)).copy_from(&-corner.transpose());
     let excess = |omega: f64| open.response(Complex::new(0.0, omega)).norm().ln();
     let mut found: Vec<f64> = Vec::new();
-    for root in eigenvalues(&hamiltonian) {
+    for root in eigenvalues(&hamiltonian)? {
         if root.im <= 0.0 || root.re.abs() > NEAR * root.norm() {
             continue;
         }
@@ -287,5 +289,5 @@ fn crossings(open: &StateSpace) -> Vec<f64> {
             found.push(omega);
         }
     }
-    found
+    Some(found)
 }

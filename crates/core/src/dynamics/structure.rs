@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
-use super::check::{Checks, Mistake, positive};
+use super::check::{Checks, LEAST, MOST, Mistake, positive};
 
 /// How far rounding may push an eigenvalue below zero, or a matrix from symmetry, relative to its largest entry.
 const ROUNDING: f64 = 1e-9;
@@ -105,8 +105,8 @@ impl Structure {
                 checks.mistake(key, format!("expected {n} x {n} numbers, found {}", values.len()));
                 return None;
             }
-            if let Some(bad) = values.iter().find(|v| !v.is_finite()) {
-                checks.mistake(key, format!("expected finite numbers, found {bad}"));
+            if let Some(bad) = values.iter().find(|v| **v != 0.0 && !(LEAST..=MOST).contains(&v.abs())) {
+                checks.mistake(key, format!("expected numbers of 0, or 1e-30 to 1e30 in size, found {bad}"));
                 return None;
             }
             let matrix = DMatrix::from_row_slice(n, n, values);
@@ -121,7 +121,7 @@ impl Structure {
         let given =
             if let Damping::Matrix(values) = damping { take("structure.damping_n_s_per_m", values) } else { None };
         let influence = influence.map_or_else(|| vec![1.0; n], <[f64]>::to_vec);
-        let sound = influence.len() == n && influence.iter().all(|v| v.is_finite());
+        let sound = influence.len() == n && influence.iter().all(|v| v.abs() <= MOST);
         checks.demand("structure.influence", sound, &format!("{n} finite numbers"), format!("{influence:?}"));
         let factor = m.as_ref().and_then(|m| {
             let factor = Cholesky::new(m.clone());

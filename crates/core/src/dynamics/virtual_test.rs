@@ -60,7 +60,7 @@ pub struct TestConfig {
     pub rate_hz: f64,
     /// `continuous`: largest change of target and measured, over their peaks, when the step is halved.
     pub tolerance: f64,
-    /// Displacement at which the test stops as unstable, m; None: 1000 times the static one.
+    /// Displacement at which the test stops as unstable, m; None: 1000 times the static one (1000 m without a motion).
     pub bound_m: Option<f64>,
 }
 
@@ -134,7 +134,7 @@ impl VirtualTest {
     ///
     /// # Errors
     /// [`Error::Configuration`] with every mistake and its key.
-    pub fn new(config: TestConfig) -> Result<Self> {
+    pub fn new(mut config: TestConfig) -> Result<Self> {
         let mut checks = Checks::default();
         positive(&mut checks, "test.rate_hz", config.rate_hz);
         checks.demand(
@@ -158,7 +158,8 @@ impl VirtualTest {
             );
             (1..=n).contains(&dof) && from_dof <= n && from_dof != dof
         };
-        let rate_hz = if config.rate_hz > 0.0 { config.rate_hz } else { 1.0 };
+        // A rate that is none makes nothing else a mistake.
+        let rate_hz = if config.rate_hz > 0.0 { config.rate_hz } else { f64::INFINITY };
         let structure = &config.structure;
         let mut left = Numerical {
             mass: structure.mass.clone(),
@@ -169,6 +170,9 @@ impl VirtualTest {
         for (i, element) in config.elements.iter().enumerate() {
             checks.under(&format!("element[{}]", i + 1), |checks| {
                 element.law.check(checks);
+                if config.stepping == Stepping::Cr {
+                    element.law.check_rate(checks, rate_hz);
+                }
                 if !place(checks, element.dof, element.from_dof) {
                     placed = false;
                 } else if element.part_of_structure {
@@ -217,6 +221,9 @@ impl VirtualTest {
         let factor = Cholesky::new(whole.mass.clone())
             .ok_or_else(|| configuration("structure.mass_kg", "expected a positive definite matrix"))?;
         let omega = modes(&factor, &whole.stiffness).0;
+        for actuator in &mut config.actuators {
+            actuator.delay = actuator.delay.clone().plain();
+        }
         Ok(Self { config, numerical: left, load, omega })
     }
 
@@ -272,10 +279,13 @@ impl VirtualTest {
 
     fn bound(&self, ground: &[f64], duration: f64) -> f64 {
         let peak = crate::pair::peak(ground);
+        if peak == 0.0 {
+            return self.config.bound_m.unwrap_or(BOUND);
+        }
         let omega = self.omega.iter().copied().find(|w| *w > 0.0);
         let scale = omega.map_or(0.5 * duration * duration, |w| (1.0 / (w * w)).min(0.5 * duration * duration));
         let influence = self.config.structure.influence.amax().max(1.0);
-        self.config.bound_m.unwrap_or(BOUND * influence * peak.max(f64::MIN_POSITIVE) * scale)
+        self.config.bound_m.unwrap_or(BOUND * influence * peak * scale)
     }
 
     /// The delay at which the loop of the only actuator begins to ring; see [`CriticalDelay`].
