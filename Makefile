@@ -86,7 +86,7 @@ test-python: .venv/built ## Python tests; browser tests where there is a Chromiu
 	$(call say,Python tests)
 	@command -v chromium || command -v chromium-browser || command -v google-chrome \
 		|| echo "NO CHROMIUM FOUND: the browser tests will be skipped (Debian: apt-get install chromium)"
-	@$(BIN)/pytest
+	@$(BIN)/pytest -n auto --dist loadfile
 
 .PHONY: fuzz
 fuzz: .venv/built toolchain ## damaged input at length: 200,000 for our reader, 5,000 for each library's

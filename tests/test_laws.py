@@ -313,6 +313,15 @@ def test_a_sharp_yield_point_does_not_make_a_test_unstable(
     assert 0.3 * np.abs(free).max() < np.abs(run.displacement).max() < np.abs(free).max()
 
 
+def test_a_friction_damper_that_holds_nearly_rigidly_does_not_shrink_the_bound() -> None:
+    # It slips at 10 kN and 1 um; the frame of 100 t then moves like one without it, not like one of 50 Hz.
+    damper = Element(BoucWen(1e10, 1e-6, 0.0), part_of_structure=False)
+    idle = Actuator((Spring(0.0),), part_of_structure=False)
+    test = VirtualTest(Structure.sdof(1.0, 0.02, 1e5), (idle,), (damper,), rate_hz=RATE)
+    run = simulate(test, smooth_motion(duration_s=8.0, scale=3.0))
+    assert 0.05 < np.abs(run.displacement).max() < 0.3
+
+
 @pytest.mark.parametrize("stepping", ["continuous", "cr"])
 def test_a_sharp_yield_point_does_not_make_a_servo_hydraulic_actuator_unstable(
     stepping: Literal["continuous", "cr"],

@@ -221,6 +221,17 @@ def test_a_delay_history_that_stands_still_is_a_constant_delay(name: str, delay:
         assert_close(getattr(other, what), getattr(one, what), physical(1e-5, "relative"), what)
 
 
+@pytest.mark.parametrize("name", ["mass", "Kelvin-Voigt", "transfer function with mass"])
+def test_a_delay_history_that_begins_with_none_moves_as_without_delay_until_it_grows(name: str) -> None:
+    motion, still = smooth_motion(duration_s=8.0), replace(LINEAR[name], delay_s=0.0)
+    growing = replace(still, delay_s=DelayHistory((6.0, 7.0), (0.0, 0.001)))
+    one, other = (simulate(sdof_test(a, structure=DAMPED), motion) for a in (still, growing))
+    until = round(6.0 * 256)
+    for what in ("target", "measured", "force"):
+        # Next to no delay with mass behind it is looked up to a few parts in a thousand.
+        assert_close(getattr(other, what)[:until], getattr(one, what)[:until], physical(5e-3, "relative"), what)
+
+
 # Chen and Ricles's stepping -------------------------------------------------------------------------------------------
 
 
@@ -1062,6 +1073,14 @@ def test_every_mistake_is_told_at_once() -> None:
 
 
 STOREY_STIFFNESSES = "storey_stiffnesses_n_per_m"
+
+
+def test_a_count_below_zero_hides_no_other_mistake() -> None:
+    wrong = sdof_test(Actuator((Spring(1e3),), dof=-1, gain=0.0, force_delay_samples=-1), rate_hz=-1.0, stepping="cr")
+    told = [mistake.key for mistake in wrong.check()]
+    assert {"test.rate_hz", "actuator[1].dof", "actuator[1].gain", "actuator[1].force_delay_samples"} <= set(told)
+    told = [mistake.key for mistake in sdof_test(rate_hz=-1.0, stepping="newmark").check()]
+    assert set(told) == {"test.rate_hz", "test.stepping"}
 
 
 @pytest.mark.parametrize(

@@ -242,15 +242,16 @@ impl<'a> Equations<'a> {
         }
     }
 
-    /// Writes a sample of every signal; whether all of them are within the bound.
-    fn record(&self, run: &mut Run, sample: usize, x: &[f64], bound: f64) -> bool {
+    /// Writes a sample of every signal, of forces with the mass that moves at once; whether all are within the bound.
+    fn record(&self, run: &mut Run, sample: usize, x: &[f64], acceleration: &[f64], bound: f64) -> bool {
         let mut within = x.iter().all(|x| x.abs() <= bound);
-        for (i, rig) in self.rigs.iter().enumerate() {
+        for (i, (rig, actuator)) in self.rigs.iter().zip(&self.test.config.actuators).enumerate() {
+            let answered = rig.seen.force + rig.inertia * actuator.across(acceleration);
             run.target[i][sample] = rig.seen.target;
             run.measured[i][sample] = rig.seen.measured;
-            within &= rig.seen.measured.abs() <= bound && rig.seen.force.is_finite();
+            within &= rig.seen.measured.abs() <= bound && answered.is_finite();
             if let Some(force) = run.force[i].get_mut(sample) {
-                *force = rig.seen.force;
+                *force = answered;
             }
         }
         for (signal, x) in run.displacement.iter_mut().zip(x) {
@@ -333,18 +334,13 @@ impl<'a> Equations<'a> {
             super::sampled::multiply(&self.inverse, force, &mut out[n..2 * n]);
         }
         self.force = several;
-        for (rig, actuator) in self.rigs.iter_mut().zip(&self.test.config.actuators) {
-            if rig.inertia != 0.0 {
-                rig.seen.force += rig.inertia * place::<ONE>(actuator, &out[n..2 * n]);
-            }
-        }
     }
 
     /// Keeps each law's memory within its limit after a step.
     #[inline(always)]
     fn hold<const ONE: bool>(&self, y: &mut [f64]) {
         if ONE {
-            y[2] = y[2].clamp(-self.limits[0], self.limits[0]);
+            y[2] = y[2].max(-self.limits[0]).min(self.limits[0]);
             return;
         }
         for (place, limit) in self.places.iter().zip(&self.limits) {
@@ -431,7 +427,7 @@ fn stepped<const ONE: bool, S: Clone + AsRef<[[f64; 4]]> + AsMut<[[f64; 4]]>>(
             for (rig, actuator) in equations.rigs.iter_mut().zip(&test.config.actuators) {
                 let (displacement, velocity) =
                     (place::<ONE>(actuator, &now[..n]), place::<ONE>(actuator, &now[n..2 * n]));
-                rig.history.push(Motion { displacement, velocity, acceleration: 0.0 });
+                rig.history.open(displacement, velocity);
             }
             equations.look(time, 0.0, h);
             equations.rate::<ONE>(at, now, k.as_mut().as_flattened_mut());
@@ -439,7 +435,7 @@ fn stepped<const ONE: bool, S: Clone + AsRef<[[f64; 4]]> + AsMut<[[f64; 4]]>>(
                 rig.history.accelerate(place::<ONE>(actuator, &k.as_ref().as_flattened()[n..2 * n]));
             }
             if step == 0 {
-                if !equations.record(&mut run, sample, &now[..n], bound) {
+                if !equations.record(&mut run, sample, &now[..n], &k.as_ref().as_flattened()[n..2 * n], bound) {
                     return Err(Error::Unstable { time_s: sample as f64 * dt, bound_m: bound });
                 }
                 if sample + 1 == ground.len() {

@@ -94,6 +94,13 @@ impl History {
         self.n_pushed += 1;
     }
 
+    /// Pushes a motion whose acceleration is not known yet: until then it is the last one's.
+    #[inline]
+    pub(crate) fn open(&mut self, displacement: f64, velocity: f64) {
+        let acceleration = self.ring[self.n_pushed.wrapping_sub(1) & self.mask].acceleration;
+        self.push(Motion { displacement, velocity, acceleration });
+    }
+
     /// Sets the acceleration of the newest motion, which is known only once its force is.
     #[inline]
     pub(crate) fn accelerate(&mut self, acceleration: f64) {

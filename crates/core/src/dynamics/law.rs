@@ -185,6 +185,14 @@ impl Law {
         }
     }
 
+    /// dr/dx that is left when all has yielded, N/m.
+    pub(crate) fn lasting_stiffness(&self) -> f64 {
+        match self {
+            Law::BoucWen(law) | Law::BaberWen { hysteresis: law, .. } => law.post_yield_ratio * law.stiffness,
+            _ => self.elastic_stiffness(),
+        }
+    }
+
     /// dr/dx', N s/m.
     pub fn viscous_damping(&self) -> f64 {
         match self {

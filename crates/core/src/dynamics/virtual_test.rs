@@ -60,7 +60,8 @@ pub struct TestConfig {
     pub rate_hz: f64,
     /// `continuous`: largest change of target and measured, over their peaks, when the step is halved.
     pub tolerance: f64,
-    /// Displacement at which the test stops as unstable, m; None: 1000 times the static one (1000 m without a motion).
+    /// Displacement at which the test stops as unstable, m; None: 1000 times the static one of the structure
+    /// when all has yielded (1000 m without a motion).
     pub bound_m: Option<f64>,
 }
 
@@ -117,6 +118,8 @@ pub struct VirtualTest {
     /// M i of the whole structure.
     pub(crate) load: Vec<f64>,
     omega: Vec<f64>,
+    /// Undamped circular frequencies when all has yielded: what the bound is measured by.
+    softest: Vec<f64>,
 }
 
 /// matrix += value b b^T
@@ -224,7 +227,16 @@ impl VirtualTest {
         for actuator in &mut config.actuators {
             actuator.delay = actuator.delay.clone().plain();
         }
-        Ok(Self { config, numerical: left, load, omega })
+        let mut yielded = left.stiffness.clone();
+        for element in &config.elements {
+            add_across(&mut yielded, element.dof, element.from_dof, element.law.lasting_stiffness());
+        }
+        for actuator in &config.actuators {
+            let lasting = actuator.specimen.iter().map(Law::lasting_stiffness).sum();
+            add_across(&mut yielded, actuator.dof, actuator.from_dof, lasting);
+        }
+        let softest = modes(&factor, &yielded).0;
+        Ok(Self { config, numerical: left, load, omega, softest })
     }
 
     /// The configuration, as checked.
@@ -282,7 +294,7 @@ impl VirtualTest {
         if peak == 0.0 {
             return self.config.bound_m.unwrap_or(BOUND);
         }
-        let omega = self.omega.iter().copied().find(|w| *w > 0.0);
+        let omega = self.softest.iter().copied().find(|w| *w > 1e-6 * self.omega[self.omega.len() - 1]);
         let scale = omega.map_or(0.5 * duration * duration, |w| (1.0 / (w * w)).min(0.5 * duration * duration));
         let influence = self.config.structure.influence.amax().max(1.0);
         self.config.bound_m.unwrap_or(BOUND * influence * peak * scale)
