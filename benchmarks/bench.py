@@ -170,7 +170,8 @@ def main() -> int:
         "",
         f"`make bench`, {date.today().isoformat()}: {machine()}. One core; medians of {TURNS} turns in which the core,"
         " the transforms, the memory reads and SciPy are measured side by side. Times in microseconds; planning is left"
-        " out; steps of virtual tests are the least of the turns. `two real transforms` is `realfft` alone; `reading once` is a fused sum of products over both arrays.",
+        " out; steps of virtual tests are the least of the turns."
+        " `two real transforms` is `realfft` alone; `reading once` is a fused sum of products over both arrays.",
         "",
     ]
     figures: list[tuple[str, str, str, bool]] = []

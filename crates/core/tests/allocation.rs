@@ -1,8 +1,11 @@
-//! Evaluating allocates nothing: it runs here under an allocator that counts.
+//! Evaluating and stepping allocate nothing: they run here under an allocator that counts.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
+use rthstrack::dynamics::{
+    Actuator, BoucWen, Compensation, Converter, Delay, Dynamics, Law, Motion, SampledActuator, ServoHydraulic,
+};
 use rthstrack::{Decimator, Detrend, Evaluator, EvaluatorConfig, Pair, Window};
 
 thread_local! {
@@ -46,4 +49,49 @@ fn evaluating_allocates_nothing() {
     let before = COUNT.with(Cell::get);
     drop(std::hint::black_box(vec![1.0f64]));
     assert_eq!(COUNT.with(Cell::get), before + 1, "the allocator does count");
+}
+
+#[test]
+fn stepping_an_actuator_allocates_nothing() {
+    let hysteresis = BoucWen {
+        stiffness: 1e6,
+        yield_displacement: 1e-3,
+        post_yield_ratio: 0.01,
+        beta: 0.55,
+        gamma: 0.45,
+        exponent: 2.0,
+    };
+    let actuator = |dynamics: Dynamics| Actuator {
+        dof: 1,
+        from_dof: 0,
+        specimen: vec![Law::BoucWen(hysteresis), Law::Maxwell { stiffness: 1e6, damping: 1e4 }],
+        specimen_mass: 29.13,
+        part_of_structure: false,
+        gain: 1.1,
+        delay: Delay::Varying { time_s: vec![0.0, 1.0], delay_s: vec![0.001, 0.0034] },
+        dynamics,
+        compensation: Compensation::None,
+        command_converter: Converter::default(),
+        displacement_sensor: Converter::default(),
+        force_sensor: Converter::default(),
+        force_delay_samples: 0,
+    };
+    let lag = Dynamics::TransferFunction { numerator: vec![400.0], denominator: vec![1.0, 30.0, 400.0] };
+    let plants = [
+        Dynamics::None,
+        Dynamics::FirstOrder { alpha: 29.0 },
+        lag,
+        Dynamics::ServoHydraulic(ServoHydraulic::default()),
+    ];
+    for dynamics in plants {
+        let plan = SampledActuator::new(&actuator(dynamics.clone()), 1024.0).unwrap();
+        let mut state = plan.state();
+        let before = COUNT.with(Cell::get);
+        for i in 0..2048 {
+            let displacement = 0.01 * (f64::from(i) * 0.01).sin();
+            let (motion, force) = plan.step(&mut state, Motion { displacement, ..Motion::default() });
+            assert!(motion.displacement.is_finite() && force.is_finite(), "{dynamics:?}");
+        }
+        assert_eq!(COUNT.with(Cell::get), before, "{dynamics:?}");
+    }
 }

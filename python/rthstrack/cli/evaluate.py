@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rthstrack.assessment import Assessment, Limits, assess, result_entry
+from rthstrack.cli.arguments import add_method, add_signals, path, positive, power_of_two, weight_power
 from rthstrack.errors import RecordingError, RthstrackError, SettingError, SignalError
 from rthstrack.recording import Recording, propose_pair, read_recording
 from rthstrack.tracking import Settings
@@ -39,46 +40,26 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "files", nargs="+", metavar="FILE", help="recorded test: text, MATLAB, HDF5, TDMS, Parquet, NumPy"
     )
-    signals = parser.add_argument_group("signals (a channel is named by name, path or #index)")
-    signals.add_argument("--target", action="append", metavar="T", help="what the model asks; repeat with --measured")
-    signals.add_argument("--measured", action="append", metavar="M", help="what the sensor says, one for each --target")
+    signals = add_signals(parser, "signals (a channel is named by name, path or #index)")
     signals.add_argument("--command", action="append", metavar="C", help="what compensation sends: judged apart")
-    signals.add_argument(
-        "--scale", action="append", type=_scale, default=[], metavar="CHANNEL=X", help="multiply a channel"
-    )
-    rate = signals.add_mutually_exclusive_group()
-    rate.add_argument("--rate", type=_positive, metavar="HZ", help="sampling rate, where the file does not say")
-    rate.add_argument("--time", metavar="T", help="channel that holds the time")
-    signals.add_argument("--start", type=_not_negative, metavar="S", help="leave out what comes before, in seconds")
-    signals.add_argument("--end", type=_positive, metavar="S", help="leave out what comes after, in seconds")
-    signals.add_argument("--fill", type=_count, metavar="SAMPLES", help="interpolate gaps of up to so many samples")
-    signals.add_argument(
-        "--resample", type=_positive, metavar="HZ", help="interpolate uneven time stamps onto this rate"
-    )
-    method = parser.add_argument_group("evaluation")
-    method.add_argument("--estimator", choices=("fei",), default="fei", help="default: fei, the published one")
-    method.add_argument("-P", type=_power_of_two, default=1, metavar="N", help="data decimation, a power of two")
-    method.add_argument("-Q", type=_power_of_two, default=1, metavar="N", help="frequency decimation, a power of two")
-    method.add_argument("--decimator", choices=("spectral", "chebyshev"), default="spectral", metavar="D",
-                        help="how P is done: spectral (default) or chebyshev, as published")  # fmt: skip
-    method.add_argument("--weight-power", type=_weight_power, default=2, metavar="L", help="bins weigh |target|^L (2)")
+    method = add_method(parser)
+    method.add_argument("-P", type=power_of_two, default=1, metavar="N", help="data decimation, a power of two")
+    method.add_argument("-Q", type=power_of_two, default=1, metavar="N", help="frequency decimation, a power of two")
+    method.add_argument("--weight-power", type=weight_power, default=2, metavar="L", help="bins weigh |target|^L (2)")
     windows = ("boxcar", "hann", "hamming", "blackman", "flattop", "tukey")
     method.add_argument("--window", choices=windows, default="boxcar", metavar="W", help=f"one of {', '.join(windows)}")
-    method.add_argument("--detrend", choices=("none", "mean", "linear"), default="none", metavar="D",
-                        help="none (default), mean or linear")  # fmt: skip
-    method.add_argument("--band", nargs=2, type=_not_negative, metavar=("LO", "HI"), help="frequencies judged, in Hz")
-    method.add_argument("--moving", type=_positive, metavar="S", help="length of a moving window (4 s)")
-    method.add_argument("--hop", type=_positive, metavar="S", help="from one moving window to the next")
+    method.add_argument("--moving", type=positive, metavar="S", help="length of a moving window (4 s)")
+    method.add_argument("--hop", type=positive, metavar="S", help="from one moving window to the next")
     limits = parser.add_argument_group("limits")
-    limits.add_argument("--limit-delay", type=_positive, metavar="S", help="largest |delay| allowed, in seconds")
-    limits.add_argument("--limit-amplitude", type=_positive, metavar="X", help="largest |amplitude - 1| allowed")
+    limits.add_argument("--limit-delay", type=positive, metavar="S", help="largest |delay| allowed, in seconds")
+    limits.add_argument("--limit-amplitude", type=positive, metavar="X", help="largest |amplitude - 1| allowed")
     output = parser.add_argument_group("output")
     output.add_argument("--json", action="store_true", help="print JSON instead of text")
-    output.add_argument("--report", type=_path(".html", ".htm"), metavar="OUT.html", help="write an interactive report")
+    output.add_argument("--report", type=path(".html", ".htm"), metavar="OUT.html", help="write an interactive report")
     output.add_argument(
-        "--figure", type=_path(*_FIGURES), metavar="OUT.png|pdf|svg", help="write a figure for a journal"
+        "--figure", type=path(*_FIGURES), metavar="OUT.png|pdf|svg", help="write a figure for a journal"
     )
-    output.add_argument("--csv", type=_path(".csv"), metavar="OUT.csv",
+    output.add_argument("--csv", type=path(".csv"), metavar="OUT.csv",
                         help="write a row a result; with --moving also the readings, to OUT_moving.csv")  # fmt: skip
     parser.set_defaults(run=lambda args: run(args, parser.error))
 
@@ -418,62 +399,3 @@ def _print_table_of_all(console: Console, assessments: Sequence[Assessment]) -> 
     for a in assessments:
         for text in (*a.exceeded, *a.warnings):
             console.print(Text(f"{a.file}: ", style="yellow") + Text(text))
-
-
-def _number(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"expected a number, found '{text}'") from None
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"expected a finite number, found '{text}'")
-    return value
-
-
-def _positive(text: str) -> float:
-    if (value := _number(text)) <= 0:
-        raise argparse.ArgumentTypeError(f"expected a positive number, found '{text}'")
-    return value
-
-
-def _not_negative(text: str) -> float:
-    if (value := _number(text)) < 0:
-        raise argparse.ArgumentTypeError(f"expected zero or a positive number, found '{text}'")
-    return value
-
-
-def _count(text: str) -> int:
-    if not text.isascii() or not text.isdigit() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"expected a whole number from 1 on, found '{text}'")
-    return int(text)
-
-
-def _power_of_two(text: str) -> int:
-    if (value := _count(text)) & (value - 1):
-        raise argparse.ArgumentTypeError(f"expected a power of two (1, 2, 4, ...), found '{text}'")
-    return value
-
-
-def _weight_power(text: str) -> int:
-    if (value := _count(text)) > 16:
-        raise argparse.ArgumentTypeError(f"expected a whole number from 1 to 16, found '{text}'")
-    return value
-
-
-def _scale(text: str) -> tuple[str, float]:
-    channel, equals, factor = text.rpartition("=")
-    if not equals or not channel:
-        raise argparse.ArgumentTypeError(f"expected CHANNEL=X, found '{text}'")
-    if (value := _number(factor)) == 0:
-        raise argparse.ArgumentTypeError(f"expected a factor other than zero, found '{text}'")
-    return channel, value
-
-
-def _path(*endings: str) -> Callable[[str], Path]:
-    def check(text: str) -> Path:
-        path = Path(text)
-        if path.suffix.lower() not in endings:
-            raise argparse.ArgumentTypeError(f"expected a name that ends in {' or '.join(endings)}, found '{text}'")
-        return path
-
-    return check

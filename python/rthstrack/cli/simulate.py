@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rthstrack.cli.evaluate import _path, _positive
+from rthstrack.cli.arguments import path, positive
 from rthstrack.configuration import read_configuration
 from rthstrack.errors import ConfigurationError, SettingError
 from rthstrack.ground_motion import ground_motion_from
@@ -42,12 +42,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "-o",
         "--output",
-        type=_path(".h5", ".hdf5"),
+        type=path(".h5", ".hdf5"),
         metavar="RUN.h5",
         help="write target, command, measured, force, displacements and ground motion, with the configuration inside; "
         "a file of this name is replaced",
     )
-    parser.add_argument("--duration", type=_positive, metavar="S", help="seconds, instead of the configuration's")
+    parser.add_argument("--duration", type=positive, metavar="S", help="seconds, instead of the configuration's")
     parser.add_argument("--seed", type=_seed, metavar="N", help="of the sensors' noise, instead of the configuration's")
     parser.set_defaults(run=lambda args: run(args, parser.error))
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rthstrack.assessment import json_ready
-from rthstrack.cli.evaluate import _count, _not_negative, _number, _positive, _scale
+from rthstrack.cli.arguments import add_method, add_signals, count, number, positive
 from rthstrack.errors import RthstrackError, SettingError
 from rthstrack.studies import COMBINED, POWERS, WEIGHT_POWERS, WINDOWS, Pair, Study, StudySettings, read_pairs, study
 
@@ -68,38 +68,18 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     powers = f"{POWERS[0]},{POWERS[1]},...,{POWERS[-1]}"
     grid.add_argument("-P", metavar="LIST", help=f"data decimations, powers of two (default: {powers})")
     grid.add_argument("-Q", metavar="LIST", help=f"frequency decimations, powers of two (default: {powers})")
-    grid.add_argument("--combined", nargs=2, type=_count, metavar=("P", "Q"),
+    grid.add_argument("--combined", nargs=2, type=count, metavar=("P", "Q"),
                       help="largest P and Q taken together; each alone goes as far as its list (default: "
                       f"{COMBINED[0]} {COMBINED[1]}, or every P with every Q where -P or -Q is given)")  # fmt: skip
     grid.add_argument("--windows", default=",".join(WINDOWS), metavar="LIST",
                       help="of boxcar, hann, hamming, blackman, flattop, tukey (default: %(default)s)")  # fmt: skip
     grid.add_argument("--weight-powers", default=",".join(map(str, WEIGHT_POWERS)), metavar="LIST",
                       help="bins weigh |target|^L, 1 to 16 (default: %(default)s)")  # fmt: skip
-    signals = parser.add_argument_group("signals of recorded tests (a channel is named by name, path or #index)")
-    signals.add_argument("--target", action="append", metavar="T", help="what the model asks; repeat with --measured")
-    signals.add_argument("--measured", action="append", metavar="M", help="what the sensor says, one for each --target")
-    signals.add_argument(
-        "--scale", action="append", type=_scale, default=[], metavar="CHANNEL=X", help="multiply a channel"
-    )
-    rate = signals.add_mutually_exclusive_group()
-    rate.add_argument("--rate", type=_positive, metavar="HZ", help="sampling rate, where the file does not say")
-    rate.add_argument("--time", metavar="T", help="channel that holds the time")
-    signals.add_argument("--start", type=_not_negative, metavar="S", help="leave out what comes before, in seconds")
-    signals.add_argument("--end", type=_positive, metavar="S", help="leave out what comes after, in seconds")
-    signals.add_argument("--fill", type=_count, metavar="SAMPLES", help="interpolate gaps of up to so many samples")
-    signals.add_argument(
-        "--resample", type=_positive, metavar="HZ", help="interpolate uneven time stamps onto this rate"
-    )
+    add_signals(parser, "signals of recorded tests (a channel is named by name, path or #index)")
     truth = parser.add_argument_group("truth, in place of what a run or configuration says itself")
-    truth.add_argument("--true-amplitude", type=_positive, metavar="X", help="measured over target")
-    truth.add_argument("--true-delay", type=_number, metavar="S", help="in seconds; positive: measured lags")
-    method = parser.add_argument_group("evaluation")
-    method.add_argument("--estimator", choices=("fei",), default="fei", help="default: fei, the published one")
-    method.add_argument("--decimator", choices=("spectral", "chebyshev"), default="spectral", metavar="D",
-                        help="how P is done: spectral (default) or chebyshev, as published")  # fmt: skip
-    method.add_argument("--detrend", choices=("none", "mean", "linear"), default="none", metavar="D",
-                        help="none (default), mean or linear")  # fmt: skip
-    method.add_argument("--band", nargs=2, type=_not_negative, metavar=("LO", "HI"), help="frequencies judged, in Hz")
+    truth.add_argument("--true-amplitude", type=positive, metavar="X", help="measured over target")
+    truth.add_argument("--true-delay", type=number, metavar="S", help="in seconds; positive: measured lags")
+    method = add_method(parser)
     method.add_argument("--no-timing", action="store_true", help="measure no computing times")
     output = parser.add_argument_group("output")
     output.add_argument("-o", "--output", type=Path, metavar="DIR", help="write CSV and figures there; made if need be")

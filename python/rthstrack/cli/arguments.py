@@ -1,0 +1,102 @@
+"""Arguments that several commands take, and what they may be."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+
+def add_signals(parser: argparse.ArgumentParser, title: str) -> argparse._ArgumentGroup:
+    """Which channels of a recording are judged, at which rate, from when to when."""
+    signals = parser.add_argument_group(title)
+    signals.add_argument("--target", action="append", metavar="T", help="what the model asks; repeat with --measured")
+    signals.add_argument("--measured", action="append", metavar="M", help="what the sensor says, one for each --target")
+    signals.add_argument(
+        "--scale", action="append", type=scale, default=[], metavar="CHANNEL=X", help="multiply a channel"
+    )
+    rate = signals.add_mutually_exclusive_group()
+    rate.add_argument("--rate", type=positive, metavar="HZ", help="sampling rate, where the file does not say")
+    rate.add_argument("--time", metavar="T", help="channel that holds the time")
+    signals.add_argument("--start", type=not_negative, metavar="S", help="leave out what comes before, in seconds")
+    signals.add_argument("--end", type=positive, metavar="S", help="leave out what comes after, in seconds")
+    signals.add_argument("--fill", type=count, metavar="SAMPLES", help="interpolate gaps of up to so many samples")
+    signals.add_argument(
+        "--resample", type=positive, metavar="HZ", help="interpolate uneven time stamps onto this rate"
+    )
+    return signals
+
+
+def add_method(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
+    """What every evaluation settles, whatever its P and Q."""
+    method = parser.add_argument_group("evaluation")
+    method.add_argument("--estimator", choices=("fei",), default="fei", help="default: fei, the published one")
+    method.add_argument("--decimator", choices=("spectral", "chebyshev"), default="spectral", metavar="D",
+                        help="how P is done: spectral (default) or chebyshev, as published")  # fmt: skip
+    method.add_argument("--detrend", choices=("none", "mean", "linear"), default="none", metavar="D",
+                        help="none (default), mean or linear")  # fmt: skip
+    method.add_argument("--band", nargs=2, type=not_negative, metavar=("LO", "HI"), help="frequencies judged, in Hz")
+    return method
+
+
+def number(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected a number, found '{text}'") from None
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"expected a finite number, found '{text}'")
+    return value
+
+
+def positive(text: str) -> float:
+    if (value := number(text)) <= 0:
+        raise argparse.ArgumentTypeError(f"expected a positive number, found '{text}'")
+    return value
+
+
+def not_negative(text: str) -> float:
+    if (value := number(text)) < 0:
+        raise argparse.ArgumentTypeError(f"expected zero or a positive number, found '{text}'")
+    return value
+
+
+def count(text: str) -> int:
+    if not text.isascii() or not text.isdigit() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 1 on, found '{text}'")
+    return int(text)
+
+
+def power_of_two(text: str) -> int:
+    if (value := count(text)) & (value - 1):
+        raise argparse.ArgumentTypeError(f"expected a power of two (1, 2, 4, ...), found '{text}'")
+    return value
+
+
+def weight_power(text: str) -> int:
+    if (value := count(text)) > 16:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 1 to 16, found '{text}'")
+    return value
+
+
+def scale(text: str) -> tuple[str, float]:
+    channel, equals, factor = text.rpartition("=")
+    if not equals or not channel:
+        raise argparse.ArgumentTypeError(f"expected CHANNEL=X, found '{text}'")
+    if (value := number(factor)) == 0:
+        raise argparse.ArgumentTypeError(f"expected a factor other than zero, found '{text}'")
+    return channel, value
+
+
+def path(*endings: str) -> Callable[[str], Path]:
+    def check(text: str) -> Path:
+        path = Path(text)
+        if path.suffix.lower() not in endings:
+            raise argparse.ArgumentTypeError(f"expected a name that ends in {' or '.join(endings)}, found '{text}'")
+        return path
+
+    return check
