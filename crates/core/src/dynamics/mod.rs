@@ -1,6 +1,5 @@
-//! Virtual tests: a structure of which part is computed and part is a specimen, moved by actuators that lag.
-//!
-//!     M x'' + C x' + K x + sum of restoring forces = -M i a_g
+//! Virtual tests: a structure of which part is computed and part is a specimen, moved by actuators that lag:
+//! M x'' + C x' + K x + sum of restoring forces = -M i a_g.
 //!
 //! Data flows through the modules in this order:
 //!
