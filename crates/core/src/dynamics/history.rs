@@ -61,13 +61,15 @@ impl Tap {
     /// `steps` >= 0 of `step_s` behind the newest.
     pub(crate) fn new(steps: f64, step_s: f64) -> Self {
         let whole = steps as usize;
-        let (s, h) = (1.0 - (steps - whole as f64), step_s);
-        let left = 1.0 - s;
+        let s = 1.0 - (steps - whole as f64);
+        // The interpolant is linear in what it passes through: its weights are what it makes of ones.
+        let [p0, d0, p1, d1] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+            .map(|[p0, d0, p1, d1]| hermite(s, step_s, p0, d0, p1, d1));
         Self {
             whole,
             reach: whole + usize::from(s < 1.0),
-            value: [(1.0 + 2.0 * s) * left * left, s * left * left * h, s * s * (3.0 - 2.0 * s), -s * s * left * h],
-            slope: [-6.0 * s * left / h, left * (1.0 - 3.0 * s), 6.0 * s * left / h, s * (3.0 * s - 2.0)],
+            value: [p0.0, d0.0, p1.0, d1.0],
+            slope: [p0.1, d0.1, p1.1, d1.1],
         }
     }
 }

@@ -145,7 +145,7 @@ impl Law {
     pub fn advance(&self, from: f64, to: f64, dt: f64, memory: &mut Memory, limit: f64) {
         let pace = match self {
             Law::Spring { .. } | Law::Dashpot { .. } | Law::KelvinVoigt { .. } => return,
-            Law::Maxwell { stiffness, damping } => 2.0 * dt * stiffness / damping,
+            Law::Maxwell { .. } => 2.0 * dt * self.relaxation_rate(),
             Law::BoucWen(law) | Law::BaberWen { hysteresis: law, .. } => {
                 10.0 * (0.25 * law.exponent).max(1.0) * (to - from).abs() / law.yield_displacement
             }
@@ -216,14 +216,10 @@ impl Law {
 
     /// Whether a loop of this rate can follow the memory.
     pub(crate) fn check_rate(&self, checks: &mut Checks, rate_hz: f64) {
+        let Law::Maxwell { stiffness, .. } = self else { return };
         let most = rate_hz * MAX_STEPS / 2.0;
-        let expected = format!("at least {:.6e} for this stiffness and rate", self.elastic() / most);
+        let expected = format!("at least {:.6e} for this stiffness and rate", stiffness / most);
         checks.demand("damping_n_s_per_m", self.relaxation_rate() <= most, &expected, "a faster relaxation");
-    }
-
-    /// k of the spring that moves at once.
-    fn elastic(&self) -> f64 {
-        if let Law::Maxwell { stiffness, .. } = self { *stiffness } else { self.elastic_stiffness() }
     }
 
     pub(crate) fn check(&self, checks: &mut Checks) {
