@@ -23,8 +23,14 @@ __all__ = [
     "shear_building",
 ]
 
-_Numbers = tuple[float, float, float, float, complex]
+_Averaged = tuple[float, float, float, float, complex]
+_Precision = tuple[float, tuple[float, float], float, tuple[float, float], float, float, str]
+_Numbers = tuple[_Averaged, _Precision]
 _Array = NDArray[np.float64]
+_Readings = tuple[
+    tuple[_Array, _Array, _Array, _Array, _Array, NDArray[np.bool_]],
+    tuple[_Array, _Array, _Array, _Array, _Array, _Array, list[str]],
+]
 _Spectra = tuple[_Array, _Array, NDArray[np.complex128], NDArray[np.complex128]]
 
 __version__: str
@@ -73,7 +79,7 @@ def evaluate_moving(
     hop_s: float,
     minimum_std_ratio: float,
     settings: Settings,
-) -> tuple[_Array, _Array, _Array, _Array, _Array, NDArray[np.bool_]]: ...
+) -> _Readings: ...
 def frequency_response(
     target: NDArray[Any],
     measured: NDArray[Any],

@@ -7,10 +7,11 @@ come in. Signals are arrays of shape (n_samples,) or (n_samples, n_actuators).
 from __future__ import annotations
 
 import dataclasses
+import math
 import operator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 
     import pandas as pd
     from numpy.typing import ArrayLike, NDArray
+
+
+_T = TypeVar("_T")
 
 
 class _Result:
@@ -73,6 +77,9 @@ class Settings:
     window: str = "boxcar"
     detrend: str = "none"
     band_hz: tuple[float, float] | None = None
+    max_delay_s: float = 0.25
+    noise: str = "white"
+    noise_ratio: float = 0.0
 
     def _checked(self) -> Settings:
         """The same with plain Python types, so that it can be hashed, compared and written."""
@@ -92,6 +99,9 @@ class Settings:
             str(self.window),
             str(self.detrend),
             band,
+            _number("max_delay_s", self.max_delay_s),
+            str(self.noise),
+            _number("noise_ratio", self.noise_ratio),
         )
 
 
@@ -159,11 +169,25 @@ def _time_s(n_samples: int, rate_hz: float) -> NDArray[np.float64]:
     return np.arange(n_samples) / rate_hz
 
 
+_SPREADS = ("amplitude_std", "delay_std_s", "residual_coherence", "goodness")
+_INTERVALS = ("amplitude_interval", "delay_interval_s")
+
+
+def _ends(name: str, interval: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    """Two columns of an interval (n, 2): its name with _low and _high before the unit."""
+    stem, unit = (name[:-2], "_s") if name.endswith("_s") else (name, "")
+    return {f"{stem}_low{unit}": interval[:, 0], f"{stem}_high{unit}": interval[:, 1]}
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Tracking(_Result):
-    """Amplitude and delay of measured over target for one record (Eqs 6-12).
+    """Amplitude and delay of measured over target for one record (Eqs 6-12, or by alignment).
 
-    Scalars for one pair, arrays of shape (n_actuators,) for several.
+    Scalars for one pair, arrays of shape (n_actuators,) for several; intervals are (low, high), or (n_actuators, 2).
+    `amplitude_std`, `amplitude_interval`, `delay_std_s`, `delay_interval_s`: standard deviation and 95 % interval, from the
+    spectrum of what the fit leaves; `residual_coherence`: how far that still follows the target, 0 to 1; `goodness`: the share
+    of measured that one gain and one delay explain. All are NaN for "fei", and where not determined: `reason` says why
+    there is no number, or no interval, and is empty where nothing is missing.
     With `weights=True` also, per kept bin (n_bins,) or (n_bins, n_actuators): `frequency_hz` (n_bins,), `weights`
     (sum to one), `target_spectrum` and `measured_spectrum` (complex DFT of the windowed, zero-padded signals).
     """
@@ -178,6 +202,13 @@ class Tracking(_Result):
     rate_hz: float
     n_samples: int
     settings: Settings
+    amplitude_std: float | NDArray[np.float64] = math.nan
+    amplitude_interval: tuple[float, float] | NDArray[np.float64] = (math.nan, math.nan)
+    delay_std_s: float | NDArray[np.float64] = math.nan
+    delay_interval_s: tuple[float, float] | NDArray[np.float64] = (math.nan, math.nan)
+    residual_coherence: float | NDArray[np.float64] = math.nan
+    goodness: float | NDArray[np.float64] = math.nan
+    reason: str | tuple[str, ...] = ""
     frequency_hz: NDArray[np.float64] | None = None
     weights: NDArray[np.float64] | None = None
     target_spectrum: NDArray[np.complex128] | None = None
@@ -186,8 +217,11 @@ class Tracking(_Result):
     def _columns(self) -> dict[str, Any]:
         numbers = {
             name: np.atleast_1d(getattr(self, name))
-            for name in ("amplitude", "phase_rad", "delay_s", "equivalent_frequency_hz", "fei")
+            for name in ("amplitude", "phase_rad", "delay_s", "equivalent_frequency_hz", "fei", *_SPREADS)
         }
+        for name in _INTERVALS:
+            numbers |= _ends(name, np.atleast_2d(np.asarray(getattr(self, name))))
+        numbers["reason"] = np.atleast_1d(np.asarray(self.reason, dtype=object))
         same = {
             "n_bins": self.n_bins,
             "delta_f_hz": self.delta_f_hz,
@@ -201,10 +235,11 @@ class Tracking(_Result):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MovingTracking(_Result):
-    """The same over moving windows: arrays (n_readings,) or (n_readings, n_actuators).
+    """The same over moving windows: arrays (n_readings,) or (n_readings, n_actuators), intervals with (low, high) last.
 
-    `time_s` is each window's centre, counted from the first sample. Where `valid` is False the target has too little
-    energy in the window to judge by, and the numbers are NaN.
+    `time_s` is each window's centre, counted from the first sample. Where `valid` is False the window could not be judged,
+    most often for want of energy, and the numbers are NaN; `reason` says why, or why there is no interval, for each reading
+    (a tuple, or a tuple of them, one an actuator).
     """
 
     time_s: NDArray[np.float64]
@@ -218,14 +253,25 @@ class MovingTracking(_Result):
     minimum_std_ratio: float
     rate_hz: float
     settings: Settings
+    amplitude_std: NDArray[np.float64]
+    amplitude_interval: NDArray[np.float64]
+    delay_std_s: NDArray[np.float64]
+    delay_interval_s: NDArray[np.float64]
+    residual_coherence: NDArray[np.float64]
+    goodness: NDArray[np.float64]
+    reason: tuple[str, ...] | tuple[tuple[str, ...], ...]
 
     def _columns(self) -> dict[str, Any]:
         n_actuators = 1 if self.amplitude.ndim == 1 else self.amplitude.shape[1]
-        names = ("amplitude", "phase_rad", "delay_s", "equivalent_frequency_hz", "valid")
-        return {
+        names = ("amplitude", "phase_rad", "delay_s", "equivalent_frequency_hz", "valid", *_SPREADS)
+        columns: dict[str, Any] = {
             "time_s": np.repeat(self.time_s, n_actuators),
             "actuator": np.tile(np.arange(n_actuators), self.time_s.size),
         } | {name: getattr(self, name).reshape(-1) for name in names}
+        for name in _INTERVALS:
+            columns |= _ends(name, getattr(self, name).reshape(-1, 2))
+        reason = np.array(self.reason, dtype=object).reshape(n_actuators, -1)
+        return columns | {"reason": reason.T.reshape(-1)}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -347,13 +393,21 @@ def evaluate(
     window: str = "boxcar",
     detrend: str = "none",
     band_hz: tuple[float, float] | None = None,
+    max_delay_s: float = 0.25,
+    noise: str = "white",
+    noise_ratio: float = 0.0,
     weights: bool = False,
 ) -> Tracking:
-    """Amplitude and delay of measured over target for whole records (Guo, Xu and Chen 2014, Eqs 1-12).
+    """Amplitude and delay of measured over target for whole records (Guo, Xu and Chen 2014, Eqs 1-12; or by alignment).
 
     FEI = sum O_k conj(I_k) |I_k|^(l-2) / sum |I_k|^l,  f_eq = sum f_k |I_k|^l / sum |I_k|^l,
     A = |FEI|,  phi = atan2(Im FEI, Re FEI),  d = -phi / (2 pi f_eq),
     over the bins k = Q, 2Q, ... <= p/P of the transform zero-padded to n = 2^ceil(log2 L) = 2p points.
+
+    estimator: "fei", the above. "least_squares": the A and d that minimise sum (O(t) - A I(t - d))^2, and "aligned": the d at
+    which the FEI of O(t) and I(t - d) has no phase. Both shift the raw target before it is detrended and windowed, so that
+    windows, drift and averaged phases do not bias them, and give 95 % intervals; the samples at the ends for which
+    I(t - d) is not known are left out.
 
     target, measured: (n_samples,) or (n_samples, n_actuators), any one unit; rate_hz: samples a second.
     data_decimation: P, a power of two: keeps frequencies up to rate/(2P); decimator "spectral" keeps exactly the
@@ -361,6 +415,10 @@ def evaluate(
     frequency_decimation: Q, a power of two: keeps every Q-th bin.
     weight_power: l, 1 to 16. window: boxcar, hann, hamming, blackman, flattop or tukey (alpha 0.5).
     detrend: none, mean or linear. band_hz: lowest and highest frequency kept, both included.
+    max_delay_s: "aligned" and "least_squares" look for delays and leads up to this, and a quarter of the record.
+    noise, noise_ratio: of "least_squares" only. noise "coloured": both signals are whitened by an autoregression of what a
+    first fit leaves, and fitted again. noise_ratio: standard deviation of the noise on target over that on measured;
+    above 0, total least squares.
     weights: also return the kept bins with their weights and spectra.
 
     delay_s > 0: measured lags. Raises SignalError for samples that cannot be judged, SettingError for settings.
@@ -383,6 +441,9 @@ def evaluate(
         window,
         detrend,
         band_hz,
+        max_delay_s,
+        noise,
+        noise_ratio,
     )._checked()
     rate_hz = _number("rate_hz", rate_hz)
     return _tracking(_plan(len(t), rate_hz, settings), settings, rate_hz, t, m, weights)
@@ -407,19 +468,23 @@ def _tracking(
             spectra = (columns[0][0], *(np.stack(column, axis=1) for column in columns[1:]))
     else:
         numbers = plan.evaluate(target, measured)
-    values: Sequence[Any] = numbers[0] if target.ndim == 1 else [np.array(v) for v in zip(*numbers, strict=True)]
-    amplitude, phase_rad, delay_s, equivalent_frequency_hz, fei = values
+    averaged: Sequence[Any]
+    precision: Sequence[Any]
+    if target.ndim == 1:
+        averaged, (*precision, reason) = numbers[0]
+    else:
+        averaged = [np.array(v) for v in zip(*(n[0] for n in numbers), strict=True)]
+        *found_precision, reasons = zip(*(n[1] for n in numbers), strict=True)
+        precision, reason = [np.array(v) for v in found_precision], tuple(reasons)
     return Tracking(
-        amplitude,
-        phase_rad,
-        delay_s,
-        equivalent_frequency_hz,
-        fei,
+        *averaged,
         plan.n_bins,
         plan.delta_f_hz,
         rate_hz,
         len(target),
         settings,
+        *precision,
+        reason,
         *spectra,
     )
 
@@ -427,18 +492,18 @@ def _tracking(
 def _each_actuator(
     target: NDArray[np.float64],
     measured: NDArray[np.float64],
-    call: Callable[[NDArray[np.float64], NDArray[np.float64]], tuple[NDArray[Any], ...]],
-) -> tuple[NDArray[Any], ...]:
-    """Applies `call` to each column and stacks what it returns."""
+    call: Callable[[NDArray[np.float64], NDArray[np.float64]], _T],
+) -> list[_T]:
+    """Applies `call` to each column; an error names the actuator."""
     if target.ndim == 1:
-        return call(target, measured)
+        return [call(target, measured)]
     found = []
     for a in range(target.shape[1]):
         try:
             found.append(call(np.ascontiguousarray(target[:, a]), np.ascontiguousarray(measured[:, a])))
         except RthstrackError as error:
             raise type(error)(f"actuator {a}: {error}") from None
-    return tuple(np.stack(column, axis=1) for column in zip(*found, strict=True))
+    return found
 
 
 def evaluate_moving(
@@ -457,11 +522,16 @@ def evaluate_moving(
     window: str = "boxcar",
     detrend: str = "none",
     band_hz: tuple[float, float] | None = None,
+    max_delay_s: float = 0.25,
+    noise: str = "white",
+    noise_ratio: float = 0.0,
 ) -> MovingTracking:
     """A(t), d(t) and f_eq(t): `evaluate` on windows of window_s, one every hop_s.
 
-    Windows of W = round(window_s rate) samples start at 0, H, 2H, ... with H = round(hop_s rate); each reading is
+    Windows of W = round(window_s rate) samples start at 0, H, 2H, ... with H = round(hop_s rate); each reading of "fei" is
     that of `evaluate` on the window's samples alone, and speaks for the window's centre (start + (W-1)/2) / rate.
+    "aligned" and "least_squares" take the shifted target's samples outside the window from the record, and where several
+    delays fit a window equally well, the one nearest to the whole record's.
     Where the target's standard deviation in the window is below minimum_std_ratio times that of the whole record, or
     nothing is left to judge by, `valid` is False and the numbers are NaN.
 
@@ -477,18 +547,25 @@ def evaluate_moving(
         window,
         detrend,
         band_hz,
+        max_delay_s,
+        noise,
+        noise_ratio,
     )._checked()
     rate_hz, window_s, hop_s = _number("rate_hz", rate_hz), _number("window_s", window_s), _number("hop_s", hop_s)
     ratio = _number("minimum_std_ratio", minimum_std_ratio)
-    time_s, amplitude, phase_rad, delay_s, frequency_hz, valid = _each_actuator(
-        t,
-        m,
-        lambda x, y: _core.evaluate_moving(x, y, rate_hz, window_s, hop_s, ratio, settings),
+    found = _each_actuator(
+        t, m, lambda x, y: _core.evaluate_moving(x, y, rate_hz, window_s, hop_s, ratio, settings)
     )
-    time_s = time_s if time_s.ndim == 1 else time_s[:, 0]
-    return MovingTracking(
-        time_s, amplitude, phase_rad, delay_s, frequency_hz, valid, window_s, hop_s, ratio, rate_hz, settings
-    )
+    time_s = found[0][0][0]
+    if t.ndim == 1:
+        ((_, *averaged), (*precision, reason)) = found[0]
+        reasons: Any = tuple(reason)
+    else:
+        averaged = [np.stack(column, axis=1) for column in list(zip(*(f[0] for f in found), strict=True))[1:]]
+        *columns, each = zip(*(f[1] for f in found), strict=True)
+        precision = [np.stack(column, axis=1) for column in columns]
+        reasons = tuple(tuple(r) for r in each)
+    return MovingTracking(time_s, *averaged, window_s, hop_s, ratio, rate_hz, settings, *precision, reasons)
 
 
 def frequency_response(

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use realfft::RealFftPlanner;
-use rthstrack::{Evaluator, EvaluatorConfig, MovingConfig, Pair, evaluate_moving};
+use rthstrack::{Estimator, Evaluator, EvaluatorConfig, MovingConfig, Pair, Window, evaluate_moving};
 
 /// Counts the bytes in use, to state the peak beside the times.
 struct Counting;
@@ -156,7 +156,7 @@ fn main() {
     let (target, measured) = pair(n);
     let pair = Pair::new(&target, &measured, RATE_HZ).expect("a valid pair");
     let mut windows = Vec::new();
-    for window in [rthstrack::Window::Boxcar, rthstrack::Window::Hann] {
+    for window in [Window::Boxcar, Window::Hann] {
         let config = MovingConfig {
             window_s: 4.0,
             hop_s: 1.0 / 64.0,
@@ -172,10 +172,49 @@ fn main() {
         );
         windows.push(time[0] / 1e3);
     }
+    let estimators = estimators(rounds);
     println!(
-        "{{\"p\": {P:?}, \"q\": {Q:?}, \"lengths\": [{}], \"moving_boxcar_ms\": {}, \"moving_hann_ms\": {}}}",
+        "{{\"p\": {P:?}, \"q\": {Q:?}, \"lengths\": [{}], \"moving_boxcar_ms\": {}, \"moving_hann_ms\": {}, \
+         \"estimators_us\": {estimators}}}",
         lengths.join(", "),
         windows[0],
         windows[1]
     );
+}
+
+/// Times of all estimators at P = Q = 1, whole records and one 4 s window within them, as a JSON object by window function
+/// and estimator: [L = 24577, 51160, 92161, one 4 s window].
+fn estimators(rounds: usize) -> String {
+    const HOP_S: f64 = 1.0;
+    let pairs: Vec<_> = LENGTHS.iter().map(|&n| pair(n)).collect();
+    let mut calls: Vec<Box<dyn FnMut() + '_>> = Vec::new();
+    let mut names = Vec::new();
+    for (window_name, window) in [("boxcar", Window::Boxcar), ("hann", Window::Hann)] {
+        for (name, estimator) in Estimator::NAMES {
+            names.push(format!("{window_name} {name}"));
+            let config = EvaluatorConfig { estimator, window, ..Default::default() };
+            for (target, measured) in &pairs {
+                let pair = Pair::new(target, measured, RATE_HZ).expect("a valid pair");
+                let evaluator = Evaluator::new(target.len(), RATE_HZ, config).expect("a valid plan");
+                let mut state = evaluator.state();
+                calls.push(Box::new(move || {
+                    black_box(evaluator.evaluate(&mut state, &pair).expect("a valid pair"));
+                }));
+            }
+            let (target, measured) = &pairs[2];
+            let pair = Pair::new(target, measured, RATE_HZ).expect("a valid pair");
+            let config = MovingConfig { window_s: 4.0, hop_s: HOP_S, minimum_std_ratio: 0.0, evaluator: config };
+            calls.push(Box::new(move || {
+                black_box(evaluate_moving(&pair, &config).expect("a valid pair"));
+            }));
+        }
+    }
+    let times = medians(rounds.div_ceil(3), &mut calls);
+    let n_windows = ((LENGTHS[2] as f64 / RATE_HZ - 4.0) / HOP_S).floor() + 1.0;
+    let rows: Vec<String> = names
+        .iter()
+        .zip(times.chunks(4))
+        .map(|(name, t)| format!("\"{name}\": [{}, {}, {}, {}]", t[0], t[1], t[2], t[3] / n_windows))
+        .collect();
+    format!("{{{}}}", rows.join(", "))
 }

@@ -120,6 +120,15 @@ pub enum Error {
         /// What it was.
         found: f64,
     },
+    /// A setting that another one excludes.
+    Combination {
+        /// Name of the setting.
+        name: &'static str,
+        /// Its value.
+        value: String,
+        /// What it needs.
+        needed: String,
+    },
     /// The record is shorter than the filter of the Chebyshev decimator needs.
     TooShortForChebyshev {
         /// Least number of samples.
@@ -200,6 +209,9 @@ impl fmt::Display for Error {
                 write!(f, "weight_power must be a whole number from 1 to 16, not {found}")
             }
             Error::Setting { name, expected, found } => write!(f, "{name} must be {expected}, not {found}"),
+            Error::Combination { name, value, needed } => {
+                write!(f, "{name} = {value} goes only with {needed}; change one of them")
+            }
             Error::TooShortForChebyshev { expected, found } => write!(
                 f,
                 "{found} samples are too few for the chebyshev decimator: at least {expected} are needed; use the spectral one"

@@ -10,9 +10,11 @@
 //! 3. [`decimate`]: P, as a short cascade or as the paper's Chebyshev filter.
 //! 4. `spectrum`: Q by folding, the transform, the kept bins.
 //! 5. [`tracking`]: Eqs 6-12, amplitude and delay; [`Evaluator`] is the plan, [`EvaluatorState`] its buffers.
-//! 6. [`moving`]: the same over moving windows.
-//! 7. [`response`]: gain, phase, delay and coherence over frequency.
-//! 8. [`mod@indices`]: the time-domain indices in use beside them.
+//! 6. `alignment`: the estimators that shift the target before it is windowed; `lag` finds where to start, `lagrange` reads
+//!    between samples, `noise` gives the intervals, [`reason`] says why there is none.
+//! 7. [`moving`]: the same over moving windows.
+//! 8. [`response`]: gain, phase, delay and coherence over frequency.
+//! 9. [`mod@indices`]: the time-domain indices in use beside them.
 //!
 //! [`dynamics`] makes such signals: virtual tests of structures with actuators that lag. It and the evaluation do not know
 //! each other.
@@ -21,12 +23,18 @@
 
 #![forbid(unsafe_code)]
 
+mod alignment;
 pub mod decimate;
 pub mod dynamics;
 pub mod error;
 pub mod indices;
+mod lag;
+mod lagrange;
 pub mod moving;
+mod noise;
 pub mod pair;
+mod quantile;
+pub mod reason;
 pub mod response;
 mod spectrum;
 pub mod tracking;
@@ -37,6 +45,7 @@ pub use error::{Error, Result, Signal};
 pub use indices::{IndexHistories, Indices, index_histories, indices};
 pub use moving::{MovingConfig, MovingTracking, evaluate_moving};
 pub use pair::Pair;
+pub use reason::Reason;
 pub use response::{FrequencyResponse, ResponseConfig, frequency_response};
-pub use tracking::{Estimator, Evaluator, EvaluatorConfig, EvaluatorState, Spectra, Tracking};
+pub use tracking::{Estimator, Evaluator, EvaluatorConfig, EvaluatorState, Noise, Spectra, Tracking};
 pub use window::{Detrend, Window};

@@ -2,7 +2,8 @@
 
 use crate::error::{Error, Result};
 use crate::pair::{MIN_SAMPLES, Pair};
-use crate::tracking::{Evaluator, EvaluatorConfig};
+use crate::reason::Reason;
+use crate::tracking::{Evaluator, EvaluatorConfig, Tracking};
 
 /// The user's numbers for a moving evaluation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,13 +37,28 @@ pub struct MovingTracking {
     pub delay_s: Vec<f64>,
     /// f_eq, in hertz (Eq 7).
     pub equivalent_frequency_hz: Vec<f64>,
+    /// Standard deviation of A; NaN of `fei`.
+    pub amplitude_std: Vec<f64>,
+    /// 95 % interval of A.
+    pub amplitude_interval: Vec<(f64, f64)>,
+    /// Standard deviation of d, in seconds.
+    pub delay_std_s: Vec<f64>,
+    /// 95 % interval of d, in seconds.
+    pub delay_interval_s: Vec<(f64, f64)>,
+    /// Coherence of the residual with the target.
+    pub residual_coherence: Vec<f64>,
+    /// Share of measured that one gain and one delay explain.
+    pub goodness: Vec<f64>,
     /// Whether the window could be judged.
     pub valid: Vec<bool>,
+    /// Why it could not, or why there is no interval.
+    pub reason: Vec<Option<Reason>>,
 }
 
 /// Evaluates windows of round(window_s rate) samples that start at 0, H, 2 H, ... with H = round(hop_s rate), at least one.
 ///
-/// Each reading is that of [`Evaluator::evaluate`] on the window's samples alone.
+/// Each reading of `fei` is that of [`Evaluator::evaluate`] on the window's samples alone; the estimators that shift the target
+/// take what is outside the window from the record.
 ///
 /// # Errors
 /// [`Error::Setting`] for a window longer than the record or a hop or ratio out of range; [`Error::NotFinite`], [`Error::Range`]; whatever
@@ -65,21 +81,15 @@ pub fn evaluate_moving(pair: &Pair<'_>, config: &MovingConfig) -> Result<MovingT
     let mut out = MovingTracking::with_capacity(starts.len());
     for start in starts {
         let tracking = if variance.of(start, start + window) < least {
-            None
+            Tracking::undetermined(Reason::Still)
         } else {
             match moving.at(start) {
-                Ok(tracking) => Some(tracking),
-                Err(Error::NoEnergy | Error::ConstantTarget { .. }) => None,
+                Ok(tracking) => tracking,
+                Err(Error::NoEnergy | Error::ConstantTarget { .. }) => Tracking::undetermined(Reason::Still),
                 Err(error) => return Err(error),
             }
         };
-        let number = |f: fn(&crate::Tracking) -> f64| tracking.as_ref().map_or(f64::NAN, f);
-        out.time_s.push((start as f64 + (window - 1) as f64 / 2.0) / rate_hz);
-        out.amplitude.push(number(|t| t.amplitude));
-        out.phase_rad.push(number(|t| t.phase_rad));
-        out.delay_s.push(number(|t| t.delay_s));
-        out.equivalent_frequency_hz.push(number(|t| t.equivalent_frequency_hz));
-        out.valid.push(tracking.is_some());
+        out.push((start as f64 + (window - 1) as f64 / 2.0) / rate_hz, &tracking);
     }
     Ok(out)
 }
@@ -92,8 +102,31 @@ impl MovingTracking {
             phase_rad: Vec::with_capacity(n),
             delay_s: Vec::with_capacity(n),
             equivalent_frequency_hz: Vec::with_capacity(n),
+            amplitude_std: Vec::with_capacity(n),
+            amplitude_interval: Vec::with_capacity(n),
+            delay_std_s: Vec::with_capacity(n),
+            delay_interval_s: Vec::with_capacity(n),
+            residual_coherence: Vec::with_capacity(n),
+            goodness: Vec::with_capacity(n),
             valid: Vec::with_capacity(n),
+            reason: Vec::with_capacity(n),
         }
+    }
+
+    fn push(&mut self, time_s: f64, t: &Tracking) {
+        self.time_s.push(time_s);
+        self.amplitude.push(t.amplitude);
+        self.phase_rad.push(t.phase_rad);
+        self.delay_s.push(t.delay_s);
+        self.equivalent_frequency_hz.push(t.equivalent_frequency_hz);
+        self.amplitude_std.push(t.amplitude_std);
+        self.amplitude_interval.push(t.amplitude_interval);
+        self.delay_std_s.push(t.delay_std_s);
+        self.delay_interval_s.push(t.delay_interval_s);
+        self.residual_coherence.push(t.residual_coherence);
+        self.goodness.push(t.goodness);
+        self.valid.push(!t.reason.is_some_and(|r| r.is_undetermined()));
+        self.reason.push(t.reason);
     }
 }
 

@@ -57,8 +57,20 @@ pub(crate) struct Spectrum {
 pub(crate) struct SpectrumState {
     pub(crate) target: Vec<Complex<f64>>,
     pub(crate) measured: Vec<Complex<f64>>,
+    pub(crate) scratch: Scratch,
+}
+
+impl SpectrumState {
+    pub(crate) fn pair(&self) -> [&[Complex<f64>]; 2] {
+        [&self.target, &self.measured]
+    }
+}
+
+/// What one transform needs beside its result.
+#[derive(Debug, Clone)]
+pub(crate) struct Scratch {
     /// Input of the cascade, and scratch of the transform: never needed at once.
-    scratch: Vec<Complex<f64>>,
+    transform: Vec<Complex<f64>>,
     passes: Vec<f64>,
 }
 
@@ -124,6 +136,11 @@ impl Spectrum {
         self.fft_len
     }
 
+    /// n / Q, the length of the folded record.
+    pub(crate) fn folded_len(&self) -> usize {
+        self.folded_len
+    }
+
     pub(crate) fn n_bins(&self) -> usize {
         self.last - self.first + 1
     }
@@ -147,15 +164,20 @@ impl Spectrum {
     }
 
     pub(crate) fn state(&self) -> SpectrumState {
-        let half = self.cascade.out_len() / 2;
-        let zero = Complex::new(0.0, 0.0);
+        SpectrumState { target: self.packed(), measured: self.packed(), scratch: self.scratch() }
+    }
+
+    /// Room for the packed transform of one signal.
+    pub(crate) fn packed(&self) -> Vec<Complex<f64>> {
+        vec![Complex::new(0.0, 0.0); self.cascade.out_len() / 2]
+    }
+
+    pub(crate) fn scratch(&self) -> Scratch {
         let (_, input_len) = self.cascade.input_layout();
         let input_len =
             if self.cascade.is_empty() { 0 } else { (input_len + ALIGNMENT / size_of::<f64>()).div_ceil(2) };
-        SpectrumState {
-            target: vec![zero; half],
-            measured: vec![zero; half],
-            scratch: vec![zero; self.fft.get_inplace_scratch_len().max(input_len)],
+        Scratch {
+            transform: vec![Complex::new(0.0, 0.0); self.fft.get_inplace_scratch_len().max(input_len)],
             passes: vec![0.0; self.cascade.scratch_len()],
         }
     }
@@ -167,12 +189,24 @@ impl Spectrum {
 
     /// The same for windows of longer records whose [`Spectrum::stream`] is given from the window's start on.
     pub(crate) fn transform_with(&self, state: &mut SpectrumState, signals: [(&[f64], Option<&[f64]>); 2]) {
-        let SpectrumState { target, measured, scratch, passes } = state;
+        let SpectrumState { target, measured, scratch } = state;
         for ((samples, stream), bins) in signals.into_iter().zip([target, measured]) {
-            let out = bytemuck::cast_slice_mut(bins);
-            self.arch.dispatch(Shorten { plan: self, samples, stream, out, scratch, passes });
-            self.fft.process_with_scratch(bins, scratch);
+            self.transform_one(scratch, samples, stream, bins);
         }
+    }
+
+    /// Transforms one signal into `bins`, a [`Spectrum::packed`].
+    pub(crate) fn transform_one(
+        &self,
+        scratch: &mut Scratch,
+        samples: &[f64],
+        stream: Option<&[f64]>,
+        bins: &mut [Complex<f64>],
+    ) {
+        let Scratch { transform, passes } = scratch;
+        let out = bytemuck::cast_slice_mut(bins);
+        self.arch.dispatch(Shorten { plan: self, samples, stream, out, scratch: transform, passes });
+        self.fft.process_with_scratch(bins, transform);
     }
 
     /// What windows that start at multiples of `hop` share: the cascade's first pass, where nothing is done to the samples
@@ -260,7 +294,12 @@ impl Spectrum {
 
     /// Hands every kept bin to `sink`, some in groups of [`LANES`] neighbours, in no particular order.
     pub(crate) fn visit<S: Sink>(&self, state: &SpectrumState, sink: &mut S) {
-        self.arch.dispatch(Visit { plan: self, state, sink });
+        self.visit_pair(state.pair(), sink);
+    }
+
+    /// The same for any two packed transforms, the first in the target's place.
+    pub(crate) fn visit_pair<S: Sink>(&self, pair: [&[Complex<f64>]; 2], sink: &mut S) {
+        self.arch.dispatch(Visit { plan: self, pair, sink });
     }
 }
 
@@ -302,7 +341,7 @@ impl WithSimd for MakeStream<'_> {
 /// [`Unpack::visit`] compiled for the processor at hand.
 struct Visit<'a, S> {
     plan: &'a Spectrum,
-    state: &'a SpectrumState,
+    pair: [&'a [Complex<f64>]; 2],
     sink: &'a mut S,
 }
 
@@ -312,7 +351,8 @@ impl<S: Sink> NullaryFnOnce for Visit<'_, S> {
     #[inline(always)]
     fn call(self) {
         let Spectrum { unpack, first, last, .. } = self.plan;
-        unpack.visit(&self.state.target, &self.state.measured, *first, *last, self.sink);
+        let [target, measured] = self.pair;
+        unpack.visit(target, measured, *first, *last, self.sink);
     }
 }
 

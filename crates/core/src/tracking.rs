@@ -4,9 +4,12 @@ use std::f64::consts::PI;
 
 use num_complex::Complex;
 
+use crate::alignment::{Alignment, AlignmentState};
 use crate::decimate::{Chebyshev, Decimator, Stream};
 use crate::error::{Error, Result, Signal};
+use crate::lag::View;
 use crate::pair::{Pair, check_rate, peak};
+use crate::reason::Reason;
 use crate::spectrum::{Bins, LANES, Sink, Spectrum, SpectrumConfig, SpectrumState};
 use crate::window::{Detrend, Window};
 
@@ -20,11 +23,31 @@ pub enum Estimator {
     /// The published weighted average, Eq 12.
     #[default]
     Fei,
+    /// Eq 12 on the target shifted by the delay, until no phase is left: no bias of windows, of drift or of averaged phases.
+    Aligned,
+    /// One gain and one delay by least squares on the shifted target: as precise as the noise allows.
+    LeastSquares,
 }
 
 impl Estimator {
     /// All choices with their names.
-    pub const NAMES: [(&'static str, Estimator); 1] = [("fei", Estimator::Fei)];
+    pub const NAMES: [(&'static str, Estimator); 3] =
+        [("fei", Estimator::Fei), ("aligned", Estimator::Aligned), ("least_squares", Estimator::LeastSquares)];
+}
+
+/// What least squares takes the noise on measured for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Noise {
+    /// Every sample weighs alike; the standard errors are those of the noise that is found, white or not.
+    #[default]
+    White,
+    /// Both signals are whitened by an autoregression of the first fit's residual, and fitted again.
+    Coloured,
+}
+
+impl Noise {
+    /// All choices with their names.
+    pub const NAMES: [(&'static str, Noise); 2] = [("white", Noise::White), ("coloured", Noise::Coloured)];
 }
 
 /// The user's numbers.
@@ -46,6 +69,12 @@ pub struct EvaluatorConfig {
     pub detrend: Detrend,
     /// Lowest and highest frequency kept, both included, in hertz.
     pub band_hz: Option<(f64, f64)>,
+    /// Largest delay or lead looked for by the estimators that shift the target, in seconds; a quarter of the record at most.
+    pub max_delay_s: f64,
+    /// What least squares takes the noise on measured for.
+    pub noise: Noise,
+    /// Standard deviation of the noise on target over that on measured; above zero, least squares is total least squares.
+    pub noise_ratio: f64,
 }
 
 impl Default for EvaluatorConfig {
@@ -59,23 +88,108 @@ impl Default for EvaluatorConfig {
             window: Window::Boxcar,
             detrend: Detrend::None,
             band_hz: None,
+            max_delay_s: 0.25,
+            noise: Noise::White,
+            noise_ratio: 0.0,
         }
     }
 }
 
+impl EvaluatorConfig {
+    /// What can be said of the settings without a record.
+    fn check(&self) -> Result<()> {
+        if !(1..=MAX_WEIGHT_POWER).contains(&self.weight_power) {
+            return Err(Error::WeightPower { found: self.weight_power });
+        }
+        if !(self.max_delay_s.is_finite() && self.max_delay_s > 0.0) {
+            let expected = "a positive duration in seconds".to_owned();
+            return Err(Error::Setting { name: "max_delay_s", expected, found: self.max_delay_s });
+        }
+        if !(self.noise_ratio.is_finite() && self.noise_ratio >= 0.0) {
+            let expected = "zero or a positive number".to_owned();
+            return Err(Error::Setting { name: "noise_ratio", expected, found: self.noise_ratio });
+        }
+        let least_squares = self.estimator == Estimator::LeastSquares;
+        let needs = |name, value: &str, needed: &str| {
+            Err(Error::Combination { name, value: value.to_owned(), needed: needed.to_owned() })
+        };
+        if self.noise_ratio > 0.0 && !least_squares {
+            return needs("noise_ratio", &self.noise_ratio.to_string(), "estimator least_squares");
+        }
+        if self.noise == Noise::Coloured && !least_squares {
+            return needs("noise", "coloured", "estimator least_squares");
+        }
+        if self.noise == Noise::Coloured && self.noise_ratio > 0.0 {
+            return needs("noise", "coloured", "noise_ratio 0");
+        }
+        if least_squares && self.weight_power != 2 {
+            return needs("weight_power", &self.weight_power.to_string(), "estimator fei or aligned");
+        }
+        if self.estimator != Estimator::Fei && self.decimator == Decimator::Chebyshev && self.data_decimation != 1 {
+            return needs("decimator", "chebyshev", "estimator fei");
+        }
+        Ok(())
+    }
+}
+
 /// Amplitude and delay of measured over target.
+///
+/// `fei` gives neither standard deviations nor intervals: its error is mostly bias. What could not be determined is NaN, and
+/// `reason` says why.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tracking {
-    /// sum O conj(I) |I|^(l-2) / sum |I|^l (Eq 12 without its quotient).
+    /// sum O conj(I) |I|^(l-2) / sum |I|^l (Eq 12 without its quotient); A exp(j phi) of the other estimators.
     pub fei: Complex<f64>,
     /// A = |FEI| (Eq 11a); 1 is perfect.
     pub amplitude: f64,
-    /// phi = atan2(Im FEI, Re FEI), in radians (Eq 11b); negative on lag. NaN where measured is zero throughout.
+    /// phi = atan2(Im FEI, Re FEI), in radians (Eq 11b); negative on lag. NaN where measured is zero throughout. Of the other
+    /// estimators -2 pi f_eq d, which may exceed half a turn.
     pub phase_rad: f64,
     /// d = -phi / (2 pi f_eq), in seconds (Eq 10); positive when measured lags.
     pub delay_s: f64,
     /// f_eq = sum f |I|^l / sum |I|^l, in hertz (Eq 7).
     pub equivalent_frequency_hz: f64,
+    /// Standard deviation of A.
+    pub amplitude_std: f64,
+    /// 95 % interval of A.
+    pub amplitude_interval: (f64, f64),
+    /// Standard deviation of d, in seconds.
+    pub delay_std_s: f64,
+    /// 95 % interval of d, in seconds.
+    pub delay_interval_s: (f64, f64),
+    /// Coherence of the residual with the target, 0 to 1: what is left still follows the target, at other gains and delays.
+    pub residual_coherence: f64,
+    /// 1 - sum (O - A I_d)^2 / sum (O - mean O)^2: the share of measured that one gain and one delay explain.
+    pub goodness: f64,
+    /// Why there is no number, or no interval.
+    pub reason: Option<Reason>,
+}
+
+impl Tracking {
+    /// Nothing but the reason.
+    pub(crate) fn undetermined(reason: Reason) -> Self {
+        Self {
+            fei: Complex::new(f64::NAN, f64::NAN),
+            amplitude: f64::NAN,
+            phase_rad: f64::NAN,
+            delay_s: f64::NAN,
+            equivalent_frequency_hz: f64::NAN,
+            amplitude_std: f64::NAN,
+            amplitude_interval: (f64::NAN, f64::NAN),
+            delay_std_s: f64::NAN,
+            delay_interval_s: (f64::NAN, f64::NAN),
+            residual_coherence: f64::NAN,
+            goodness: f64::NAN,
+            reason: Some(reason),
+        }
+    }
+
+    /// The numbers without their precision.
+    pub(crate) fn without_interval(self, reason: Reason) -> Self {
+        let (amplitude_interval, delay_interval_s) = ((f64::NAN, f64::NAN), (f64::NAN, f64::NAN));
+        let (amplitude_std, delay_std_s) = (f64::NAN, f64::NAN);
+        Self { amplitude_std, amplitude_interval, delay_std_s, delay_interval_s, reason: Some(reason), ..self }
+    }
 }
 
 /// The bins behind a [`Tracking`], one entry a kept bin.
@@ -114,6 +228,7 @@ pub struct Evaluator {
     chebyshev: Option<Chebyshev>,
     spectrum: Spectrum,
     correction: Option<Vec<f64>>,
+    alignment: Option<Alignment>,
 }
 
 /// What changes during an evaluation: its buffers. Make one a thread.
@@ -122,6 +237,7 @@ pub struct EvaluatorState {
     spectrum: SpectrumState,
     decimated: [Vec<f64>; 2],
     filter: Vec<f64>,
+    alignment: Option<AlignmentState>,
 }
 
 impl Evaluator {
@@ -134,9 +250,7 @@ impl Evaluator {
         if n_samples < crate::pair::MIN_SAMPLES {
             return Err(Error::TooShort { expected: crate::pair::MIN_SAMPLES, found: n_samples });
         }
-        if !(1..=MAX_WEIGHT_POWER).contains(&config.weight_power) {
-            return Err(Error::WeightPower { found: config.weight_power });
-        }
+        config.check()?;
         let chebyshev = match config.decimator {
             Decimator::Chebyshev if config.data_decimation != 1 => {
                 if n_samples < Chebyshev::MIN_SAMPLES {
@@ -168,7 +282,11 @@ impl Evaluator {
             other => other,
         })?;
         let correction = spectrum.correction();
-        Ok(Self { config, n_samples, rate_hz, chebyshev, spectrum, correction })
+        let alignment = match config.estimator {
+            Estimator::Fei => None,
+            _ => Some(Alignment::new(n_samples, rate_hz, &config)?),
+        };
+        Ok(Self { config, n_samples, rate_hz, chebyshev, spectrum, correction, alignment })
     }
 
     /// The settings.
@@ -206,16 +324,30 @@ impl Evaluator {
             spectrum: self.spectrum.state(),
             decimated: [vec![0.0; decimated], vec![0.0; decimated]],
             filter: vec![0.0; filter],
+            alignment: self.alignment.as_ref().map(Alignment::state),
         }
     }
 
-    /// Evaluates one pair (Eqs 1 to 12). Allocates nothing.
+    /// Evaluates one pair (Eqs 1 to 12, or by alignment). Allocates nothing.
     ///
     /// # Errors
     /// [`Error::Plan`] for a pair of another length or rate, [`Error::NotFinite`], [`Error::NoEnergy`], [`Error::Range`].
     pub fn evaluate(&self, state: &mut EvaluatorState, pair: &Pair<'_>) -> Result<Tracking> {
+        if let (Some(alignment), Some(state)) = (&self.alignment, &mut state.alignment) {
+            self.check_plan(pair)?;
+            pair.check_samples()?;
+            return Ok(alignment.estimate(state, &View::whole(pair), 0, None));
+        }
+        self.published(state, pair)
+    }
+
+    /// Eqs 1 to 12, whatever the estimator.
+    fn published(&self, state: &mut EvaluatorState, pair: &Pair<'_>) -> Result<Tracking> {
         self.transform(state, pair)?;
-        self.finish(self.sum(&state.spectrum), pair)
+        self.finish(
+            weigh(&self.spectrum, self.correction.as_deref(), self.config.weight_power, state.spectrum.pair()),
+            pair,
+        )
     }
 
     /// The same with the bins behind it.
@@ -223,7 +355,7 @@ impl Evaluator {
     /// # Errors
     /// Those of [`Evaluator::evaluate`].
     pub fn evaluate_with_spectra(&self, state: &mut EvaluatorState, pair: &Pair<'_>) -> Result<(Tracking, Spectra)> {
-        let tracking = self.evaluate(state, pair)?;
+        let published = self.published(state, pair)?;
         let n = self.n_bins();
         let mut collected = Collect {
             first: self.spectrum.first(),
@@ -246,15 +378,21 @@ impl Evaluator {
             target,
             measured,
         };
+        let tracking = if self.alignment.is_some() { self.evaluate(state, pair)? } else { published };
         Ok((tracking, spectra))
     }
 
-    fn transform(&self, state: &mut EvaluatorState, pair: &Pair<'_>) -> Result<()> {
+    fn check_plan(&self, pair: &Pair<'_>) -> Result<()> {
         let found = (pair.n_samples(), pair.rate_hz());
-        if found != (self.n_samples, self.rate_hz) {
-            return Err(Error::Plan { expected: (self.n_samples, self.rate_hz), found });
+        if found == (self.n_samples, self.rate_hz) {
+            return Ok(());
         }
-        let EvaluatorState { spectrum, decimated: [target, measured], filter } = state;
+        Err(Error::Plan { expected: (self.n_samples, self.rate_hz), found })
+    }
+
+    fn transform(&self, state: &mut EvaluatorState, pair: &Pair<'_>) -> Result<()> {
+        self.check_plan(pair)?;
+        let EvaluatorState { spectrum, decimated: [target, measured], filter, .. } = state;
         let (target, measured) = match &self.chebyshev {
             Some(chebyshev) => {
                 chebyshev.run(pair.target(), filter, target)?;
@@ -265,25 +403,6 @@ impl Evaluator {
         };
         self.spectrum.transform(spectrum, target, measured);
         Ok(())
-    }
-
-    fn sum(&self, state: &SpectrumState) -> Sums {
-        let (first, power) = (self.spectrum.first(), self.config.weight_power);
-        match (power, &self.correction) {
-            (2, None) => self.sum_with(state, Weigh::<2, false>::new(&[], 0, 2)),
-            (2, Some(correction)) => self.sum_with(state, Weigh::<2, true>::new(correction, first, 2)),
-            (_, None) => self.sum_with(state, Weigh::<0, false>::new(&[], 0, power)),
-            (_, Some(correction)) => self.sum_with(state, Weigh::<0, true>::new(correction, first, power)),
-        }
-    }
-
-    fn sum_with<const L: u32, const CORRECT: bool>(
-        &self,
-        state: &SpectrumState,
-        mut weigh: Weigh<'_, L, CORRECT>,
-    ) -> Sums {
-        self.spectrum.visit(state, &mut weigh);
-        weigh.sums()
     }
 
     /// Eqs 10 and 11 from the sums.
@@ -323,6 +442,8 @@ impl Evaluator {
             phase_rad,
             delay_s: delay(phase_rad, equivalent_frequency_hz),
             equivalent_frequency_hz,
+            reason: None,
+            ..Tracking::undetermined(Reason::Still)
         })
     }
 }
@@ -355,12 +476,36 @@ fn weight(squared: f64, power: u32) -> f64 {
 
 /// The sums of Eqs 7 and 12, frequency in bins.
 #[derive(Debug, Clone, Copy)]
-struct Sums {
-    cross: Complex<f64>,
-    power: f64,
-    moment: f64,
+pub(crate) struct Sums {
+    pub(crate) cross: Complex<f64>,
+    pub(crate) power: f64,
+    pub(crate) moment: f64,
     /// sum |I|^2, which is `power` for l = 2.
     energy: f64,
+}
+
+/// Sums over the kept bins of a pair of packed transforms, target first.
+pub(crate) fn weigh(
+    spectrum: &Spectrum,
+    correction: Option<&[f64]>,
+    weight_power: u32,
+    pair: [&[Complex<f64>]; 2],
+) -> Sums {
+    fn sum<const L: u32, const CORRECT: bool>(
+        spectrum: &Spectrum,
+        pair: [&[Complex<f64>]; 2],
+        mut weigh: Weigh<'_, L, CORRECT>,
+    ) -> Sums {
+        spectrum.visit_pair(pair, &mut weigh);
+        weigh.sums()
+    }
+    let first = spectrum.first();
+    match (weight_power, correction) {
+        (2, None) => sum(spectrum, pair, Weigh::<2, false>::new(&[], 0, 2)),
+        (2, Some(correction)) => sum(spectrum, pair, Weigh::<2, true>::new(correction, first, 2)),
+        (power, None) => sum(spectrum, pair, Weigh::<0, false>::new(&[], 0, power)),
+        (power, Some(correction)) => sum(spectrum, pair, Weigh::<0, true>::new(correction, first, power)),
+    }
 }
 
 /// Adds up O conj(I) |I|^(l-2), |I|^l and k |I|^l. `L` = 2 is compiled apart; 0 stands for any power.
@@ -444,31 +589,41 @@ pub(crate) struct Moving<'a> {
     state: EvaluatorState,
     pair: &'a Pair<'a>,
     streams: Option<[Stream; 2]>,
+    /// Delay of the whole record in samples, which tells a window whose target is one tone which turn it is.
+    expected: Option<f64>,
 }
 
 impl Evaluator {
     /// Prepares to evaluate windows of `pair` that start at multiples of `hop`.
     pub(crate) fn moving<'a>(&'a self, pair: &'a Pair<'a>, hop: usize) -> Moving<'a> {
-        let streams = match self.chebyshev {
-            Some(_) => None,
-            None => {
+        let streams = match (&self.chebyshev, &self.alignment) {
+            (Some(_), _) | (_, Some(_)) => None,
+            _ => {
                 let stream = |samples| self.spectrum.stream(samples, hop);
                 stream(pair.target()).zip(stream(pair.measured())).map(|(target, measured)| [target, measured])
             }
         };
-        Moving { evaluator: self, state: self.state(), pair, streams }
+        let expected = self.alignment.as_ref().and_then(|_| Alignment::expected(pair, self.config.max_delay_s));
+        Moving { evaluator: self, state: self.state(), pair, streams, expected }
     }
 }
 
 impl Moving<'_> {
-    /// The reading of the window that starts at sample `start`: that of [`Evaluator::evaluate`], bit for bit.
+    /// The reading of the window that starts at sample `start`: of `fei` that of [`Evaluator::evaluate`], bit for bit; the other
+    /// estimators also see the target outside the window. The samples are finite.
     pub(crate) fn at(&mut self, start: usize) -> Result<Tracking> {
-        let Self { evaluator, state, pair, streams } = self;
+        let Self { evaluator, state, pair, streams, expected } = self;
+        if let (Some(alignment), Some(state)) = (&evaluator.alignment, &mut state.alignment) {
+            return Ok(alignment.estimate(state, &View::whole(pair), start, *expected));
+        }
         let range = start..start + evaluator.n_samples;
         let window = Pair::new(&pair.target()[range.clone()], &pair.measured()[range], pair.rate_hz())?;
         let Some([target, measured]) = streams else { return evaluator.evaluate(state, &window) };
         let signals = [(window.target(), Some(target.from(start))), (window.measured(), Some(measured.from(start)))];
         evaluator.spectrum.transform_with(&mut state.spectrum, signals);
-        evaluator.finish(evaluator.sum(&state.spectrum), &window)
+        let config = &evaluator.config;
+        let sums =
+            weigh(&evaluator.spectrum, evaluator.correction.as_deref(), config.weight_power, state.spectrum.pair());
+        evaluator.finish(sums, &window)
     }
 }

@@ -123,6 +123,12 @@ impl Line {
     /// Value of the line at sample `i`.
     #[inline(always)]
     pub fn at(&self, i: usize) -> f64 {
-        self.level + self.slope * (i as f64 - self.centre)
+        self.at_f64(i as f64)
+    }
+
+    /// The same at any place, before the first sample and after the last too.
+    #[inline(always)]
+    pub(crate) fn at_f64(&self, i: f64) -> f64 {
+        self.level + self.slope * (i - self.centre)
     }
 }

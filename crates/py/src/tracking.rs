@@ -5,13 +5,18 @@ use std::sync::Mutex;
 use num_complex::Complex;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
-use rthstrack::{Decimator, Detrend, Estimator, EvaluatorConfig, EvaluatorState, Pair, Spectra, Tracking, Window};
+use rthstrack::{
+    Decimator, Detrend, Estimator, EvaluatorConfig, EvaluatorState, Noise, Pair, Reason, Spectra, Tracking, Window,
+};
 
 use crate::error::{choice, of_actuator, to_py};
 use crate::signal::Columns;
 
 /// amplitude, phase_rad, delay_s, equivalent_frequency_hz, fei
-pub(crate) type Numbers = (f64, f64, f64, f64, Complex<f64>);
+type Averaged = (f64, f64, f64, f64, Complex<f64>);
+/// amplitude_std, amplitude_interval, delay_std_s, delay_interval_s, residual_coherence, goodness, reason
+type Precision = (f64, (f64, f64), f64, (f64, f64), f64, f64, String);
+pub(crate) type Numbers = (Averaged, Precision);
 /// frequency_hz, weights, target_spectrum, measured_spectrum
 type SpectraArrays<'py> = (
     Bound<'py, PyArray1<f64>>,
@@ -21,7 +26,23 @@ type SpectraArrays<'py> = (
 );
 
 pub(crate) fn numbers(t: &Tracking) -> Numbers {
-    (t.amplitude, t.phase_rad, t.delay_s, t.equivalent_frequency_hz, t.fei)
+    (
+        (t.amplitude, t.phase_rad, t.delay_s, t.equivalent_frequency_hz, t.fei),
+        (
+            t.amplitude_std,
+            t.amplitude_interval,
+            t.delay_std_s,
+            t.delay_interval_s,
+            t.residual_coherence,
+            t.goodness,
+            words(t.reason.as_ref()),
+        ),
+    )
+}
+
+/// A reason in words, nothing where there is none.
+pub(crate) fn words(reason: Option<&Reason>) -> String {
+    reason.map_or_else(String::new, Reason::to_string)
 }
 
 /// `rthstrack.Settings`, read by its attributes.
@@ -35,6 +56,9 @@ pub(crate) struct Settings {
     window: String,
     detrend: String,
     band_hz: Option<(f64, f64)>,
+    max_delay_s: f64,
+    noise: String,
+    noise_ratio: f64,
 }
 
 impl Settings {
@@ -49,6 +73,9 @@ impl Settings {
             window: choice(py, "window", &Window::NAMES, &self.window)?,
             detrend: choice(py, "detrend", &Detrend::NAMES, &self.detrend)?,
             band_hz: self.band_hz,
+            max_delay_s: self.max_delay_s,
+            noise: choice(py, "noise", &Noise::NAMES, &self.noise)?,
+            noise_ratio: self.noise_ratio,
         })
     }
 }

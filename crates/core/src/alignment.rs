@@ -1,0 +1,975 @@
+//! Gain and delay without the bias of windows, drift and averaged phases: the target is shifted before it is windowed.
+//!
+//! Model over the judged samples: O(t) = K I(t - tau) + noise. The raw target is interpolated ([`crate::lagrange`]), with
+//! samples from outside the window where there are any, shifted, detrended and windowed like measured, and
+//!
+//! ```text
+//! least squares:  min over K, tau of  sum |O - K I_tau|^2 / (lambda + K^2 g)      (lambda = 1, g = 0 for an exact target)
+//! aligned:        arg sum O_k conj(I_tau,k) |I_tau,k|^(l-2) = 0                    (Eq 12 on the shifted target)
+//! ```
+//!
+//! are solved for tau by Newton's steps. With noise on the target, lambda is the ratio of the noise variances and g what the
+//! interpolation leaves of the target's noise. In time where all bins are kept, over the kept bins otherwise.
+
+use std::ops::Range;
+
+use num_complex::Complex;
+use pulp::{Arch, NullaryFnOnce, Simd, WithSimd};
+
+use crate::error::Result;
+use crate::lag::{Peak, Peaks, Search, SearchState, View};
+use crate::lagrange::{AFTER, BEFORE, NODES, Taps};
+use crate::noise::{
+    Autoregression, Influence, MAX_ORDER, NoisyTarget, Precision, Sampling, Spread, SpreadState, cell_width,
+};
+use crate::reason::Reason;
+use crate::spectrum::{Bins, LANES, Scratch, Sink, Spectrum, SpectrumConfig};
+use crate::tracking::{Estimator, EvaluatorConfig, Noise, Tracking, delay, weigh};
+use crate::window::{Detrend, Window};
+
+/// Newton's steps at most.
+const MAX_STEPS: usize = 24;
+/// A step this short, in samples, is the last: what it leaves is its square.
+const LAST_STEP: f64 = 1e-4;
+/// Fewest samples that are judged.
+const MIN_SUPPORT: usize = 16;
+/// Fewest cycles of the target in the window.
+const MIN_CYCLES: f64 = 0.5;
+/// Least share of measured that must follow the target.
+const MIN_GOODNESS: f64 = 0.1;
+/// Two delays fit equally well if the likelihood of one is below exp(10) times that of the other.
+const LOG_ODDS: f64 = 10.0;
+/// Energy of the target over its noise from which a few bins count: of noise alone it happens once in 10,000.
+const CLEAR: f64 = 3.0;
+/// A residual of this share of measured is as good as none: that of interpolation and round-off.
+const EXACT: f64 = 1e-14;
+
+/// The checked plan for windows of one length.
+pub(crate) struct Alignment {
+    estimator: Estimator,
+    n_samples: usize,
+    rate_hz: f64,
+    max_delay: f64,
+    noise: Noise,
+    noise_ratio: f64,
+    weight_power: u32,
+    detrend: Detrend,
+    window: Option<Vec<f64>>,
+    search: Search,
+    spectrum: Spectrum,
+    correction: Option<Vec<f64>>,
+    /// All bins are kept, so that sums over samples serve.
+    in_time: bool,
+    /// cos of the kept bins' frequencies, in radians a sample.
+    cosines: Vec<f64>,
+    arch: Arch,
+}
+
+/// Its buffers.
+#[derive(Debug, Clone)]
+pub(crate) struct AlignmentState {
+    search: SearchState,
+    signals: Signals,
+    /// Transforms of displacement, velocity, and measured or residual.
+    bins: [Vec<Complex<f64>>; 3],
+    scratch: Scratch,
+    spread: SpreadState,
+    /// Of the autoregression.
+    work: Vec<f64>,
+    /// Target and measured, less what an autoregression predicts of the noise.
+    whitened: [Vec<f64>; 2],
+    weighting: Weighting,
+}
+
+/// What a bin counts where both signals are noisy.
+#[derive(Debug, Clone)]
+struct Weighting {
+    /// W_k = 1 - noise / energy around bin k, zero where it does not stand clear of the noise.
+    weights: Vec<f64>,
+    /// sqrt(W_k), times what makes good the droop of the cascade.
+    factors: Vec<f64>,
+    /// sum W_k cos(l omega_k) / sum W_k: how white noise correlates between samples, seen through the weights.
+    correlation: [f64; NODES],
+}
+
+/// n samples each, zero outside the judged ones.
+#[derive(Debug, Clone)]
+struct Signals {
+    /// Measured, detrended and windowed; later the residual.
+    measured: Vec<f64>,
+    /// The shifted target, and its slope a sample, alike.
+    shifted: Vec<f64>,
+    slope: Vec<f64>,
+}
+
+/// Inner products of the shifted target y, its slope y' and measured o.
+#[derive(Debug, Clone, Copy, Default)]
+struct Products {
+    yy: f64,
+    yv: f64,
+    vv: f64,
+    oy: f64,
+    ov: f64,
+    oo: f64,
+}
+
+/// Which of the transforms is of measured, later of the residual.
+const MEASURED: usize = 2;
+
+/// What a fit found.
+#[derive(Debug, Clone, Copy)]
+struct Fit {
+    /// Delay in samples, and how far it lies from where the signals stand.
+    tau: f64,
+    step: f64,
+    gain: f64,
+    products: Products,
+    /// The same less what noise on the target adds.
+    clean: Products,
+    residual: f64,
+}
+
+impl Alignment {
+    /// The plan of a configuration that [`crate::Evaluator::new`] has checked.
+    pub(crate) fn new(n_samples: usize, rate_hz: f64, config: &EvaluatorConfig) -> Result<Self> {
+        let EvaluatorConfig { data_decimation, frequency_decimation, band_hz, .. } = *config;
+        // What is done to the samples is done here, over those that are judged.
+        let spectrum = Spectrum::new(SpectrumConfig {
+            n_samples,
+            rate_hz,
+            data_decimation,
+            frequency_decimation,
+            window: Window::Boxcar,
+            detrend: Detrend::None,
+            band_hz,
+        })?;
+        let undecimated = data_decimation == 1 && frequency_decimation == 1 && band_hz.is_none();
+        let in_time = config.estimator == Estimator::LeastSquares && undecimated && config.noise_ratio == 0.0;
+        let radians = 2.0 * std::f64::consts::PI * spectrum.delta_f_hz() / rate_hz;
+        let first = spectrum.first();
+        let cosines: Vec<f64> = (0..spectrum.n_bins()).map(|k| ((first + k) as f64 * radians).cos()).collect();
+        Ok(Self {
+            estimator: config.estimator,
+            n_samples,
+            rate_hz,
+            max_delay: config.max_delay_s * rate_hz,
+            noise: config.noise,
+            noise_ratio: config.noise_ratio,
+            weight_power: config.weight_power,
+            detrend: config.detrend,
+            window: config.window.coefficients(n_samples),
+            search: Search::new(n_samples, config.max_delay_s * rate_hz),
+            correction: spectrum.correction(),
+            spectrum,
+            in_time,
+            cosines,
+            arch: Arch::new(),
+        })
+    }
+
+    pub(crate) fn state(&self) -> AlignmentState {
+        let n = self.n_samples;
+        let whitened = if self.noise == Noise::Coloured { self.longest_view() } else { 0 };
+        let weighted = if self.noise_ratio > 0.0 { self.spectrum.n_bins() } else { 0 };
+        AlignmentState {
+            search: self.search.state(),
+            signals: Signals { measured: vec![0.0; n], shifted: vec![0.0; n], slope: vec![0.0; n] },
+            bins: std::array::from_fn(|_| self.spectrum.packed()),
+            scratch: self.spectrum.scratch(),
+            spread: SpreadState::new(self.spectrum.n_bins()),
+            work: vec![0.0; 2 * n],
+            whitened: std::array::from_fn(|_| vec![0.0; whitened]),
+            weighting: Weighting {
+                weights: vec![0.0; weighted],
+                factors: vec![0.0; weighted],
+                correlation: [0.0; NODES],
+            },
+        }
+    }
+
+    /// Gain and delay over the window that starts at sample `start` of the record; the samples are finite. Of delays that fit
+    /// equally well the one nearest to `expected` (in samples) is taken; without it the answer is "ambiguous".
+    pub(crate) fn estimate(
+        &self,
+        state: &mut AlignmentState,
+        view: &View<'_>,
+        start: usize,
+        expected: Option<f64>,
+    ) -> Tracking {
+        match self.determine(state, view, start, expected) {
+            Ok(tracking) => tracking,
+            Err(reason) => Tracking::undetermined(reason),
+        }
+    }
+
+    fn determine(
+        &self,
+        state: &mut AlignmentState,
+        view: &View<'_>,
+        start: usize,
+        expected: Option<f64>,
+    ) -> std::result::Result<Tracking, Reason> {
+        let Some(peaks) = self.search.peaks(&mut state.search, view, start) else { return Err(Reason::Still) };
+        if peaks.cycles < MIN_CYCLES {
+            return Err(Reason::FewCycles { found: peaks.cycles });
+        }
+        let highest = peaks.peaks().first().map_or(0.0, |p| p.correlation);
+        if -peaks.lowest > highest + 0.1 {
+            return Err(Reason::OppositeSign);
+        }
+        if self.noise_ratio > 0.0 {
+            self.weigh_bins(state, view, start, peaks.peaks()[0].lag);
+            let (first, _) = self.best(state, view, start, peaks.peaks(), peaks.step, expected, true)?;
+            // Once more at a delay that leaves nothing but noise.
+            self.weigh_bins(state, view, start, first.tau);
+            let around = Peak { lag: first.tau, correlation: 1.0 };
+            let (best, support) = self.best(state, view, start, &[around], peaks.step, None, true)?;
+            return self.complete(state, view, start, &peaks, best, support);
+        }
+        let (best, support) = self.best(state, view, start, peaks.peaks(), peaks.step, expected, false)?;
+        if self.noise == Noise::Coloured {
+            // Whitened by what the residual says of the noise, measured and target obey the same model.
+            self.leave_residual(state, &best, start, &support);
+            let noise = self.autoregression(state, start, &support);
+            let p = noise.order;
+            if p > 0 {
+                let margin = self.search.reach() + 2 * NODES;
+                let from = start.saturating_sub(margin + p).max(view.origin);
+                let to = (start + self.n_samples + margin).min(view.end());
+                let part = from - view.origin..to - view.origin;
+                let [mut first, mut second] = std::mem::take(&mut state.whitened);
+                let n = part.len() - p;
+                noise.whiten(&view.target[part.clone()], &mut first[..n]);
+                noise.whiten(&view.measured[part], &mut second[..n]);
+                let view = View { target: &first[..n], measured: &second[..n], origin: from + p };
+                let around = Peak { lag: best.tau, correlation: 1.0 };
+                let found = self
+                    .best(state, &view, start, &[around], peaks.step, None, false)
+                    .and_then(|(best, support)| self.complete(state, &view, start, &peaks, best, support));
+                state.whitened = [first, second];
+                return found;
+            }
+            self.place_measured(state, view, start, &support);
+        }
+        self.complete(state, view, start, &peaks, best, support)
+    }
+
+    /// From the least-squares delay over all frequencies to the estimator's own.
+    fn complete(
+        &self,
+        state: &mut AlignmentState,
+        view: &View<'_>,
+        start: usize,
+        peaks: &Peaks,
+        mut best: Fit,
+        mut support: Range<usize>,
+    ) -> std::result::Result<Tracking, Reason> {
+        if self.estimator == Estimator::Aligned {
+            let tracking = self.align(state, view, start, &support, best)?;
+            self.check_delay(tracking.delay_s * self.rate_hz)?;
+            return Ok(tracking);
+        }
+        if !self.in_time && self.noise_ratio == 0.0 {
+            // Other frequencies may have another delay: a part of a period away at most.
+            let room = (0.2 * self.n_samples as f64 / peaks.cycles).clamp(2.0, self.search.reach() as f64);
+            support = self.support(view, start, best.tau - room, best.tau + room);
+            best = self.refine(state, view, start, &support, best.tau, room, true)?;
+        }
+        self.check_delay(best.tau)?;
+        Ok(self.finish(state, start, &support, &best, None))
+    }
+
+    fn check_delay(&self, tau: f64) -> std::result::Result<(), Reason> {
+        if tau.abs() > self.max_delay * (1.0 + 1e-9) {
+            return Err(Reason::BeyondMaxDelay { max_delay_s: self.max_delay / self.rate_hz });
+        }
+        Ok(())
+    }
+
+    /// Learns, with the target shifted by `lag`, where its energy stands above its noise; what is below only adds noise.
+    fn weigh_bins(&self, state: &mut AlignmentState, view: &View<'_>, start: usize, lag: f64) {
+        let support = self.support(view, start, lag - 1.0, lag + 1.0);
+        state.weighting.weights.fill(1.0);
+        state.weighting.refresh(self.correction.as_deref(), &self.cosines);
+        if support.len() < MIN_SUPPORT {
+            return;
+        }
+        self.place_measured(state, view, start, &support);
+        self.place_target(state, view, start, &support, lag);
+        self.spectrum.transform_one(&mut state.scratch, &state.signals.measured, None, &mut state.bins[MEASURED]);
+        let products = self.products_in_bins(state);
+        let Some(score) = self.score(&products, &Taps::at(fraction(lag).1), &state.weighting.correlation) else {
+            return;
+        };
+        let within = support.start - start..support.end - start;
+        let (window_power, fourths) = self.window_moments(&within);
+        let AlignmentState { bins: [y, _, o], weighting, .. } = state;
+        let mut energies = Energies {
+            gain: score.gain,
+            ratio: self.noise_ratio,
+            first: self.spectrum.first(),
+            correction: self.correction.as_deref(),
+            energy: &mut weighting.weights,
+            residual: &mut weighting.factors,
+        };
+        self.spectrum.visit_pair([y, o], &mut energies);
+        let bins_per_piece = (self.spectrum.folded_len() as f64 * fourths / (window_power * window_power)).max(1.0);
+        weighting.learn(cell_width(bins_per_piece), 1.0 / (self.noise_ratio.powi(-2) + score.gain * score.gain));
+        weighting.refresh(self.correction.as_deref(), &self.cosines);
+    }
+
+    /// Longest stretch of record that a window needs.
+    fn longest_view(&self) -> usize {
+        self.n_samples + 2 * (self.search.reach() + 2 * NODES) + MAX_ORDER
+    }
+
+    /// Refines the peaks and takes the best, whose signals stand in the state afterwards.
+    fn best(
+        &self,
+        state: &mut AlignmentState,
+        view: &View<'_>,
+        start: usize,
+        peaks: &[Peak],
+        step: usize,
+        expected: Option<f64>,
+        in_bins: bool,
+    ) -> std::result::Result<(Fit, Range<usize>), Reason> {
+        let room = step as f64 + 2.0;
+        let around = |least: f64, most: f64| self.support(view, start, least - room - 1.0, most + room + 1.0);
+        let distance = |lag: f64| expected.map_or(0.0, |expected| (lag - expected).abs());
+        let Some(highest) = peaks.first() else { return Err(Reason::Still) };
+        // One peak, or the highest is nearest to the expected delay: nothing to choose between.
+        let is_nearest = peaks.iter().all(|p| distance(p.lag) >= distance(highest.lag));
+        if peaks.len() == 1 || (expected.is_some() && is_nearest) {
+            let support = around(highest.lag, highest.lag);
+            let fit = self.refine(state, view, start, &support, highest.lag, room, in_bins)?;
+            return Ok((fit, support));
+        }
+        let lags = || peaks.iter().map(|p| p.lag);
+        let support = around(lags().fold(f64::INFINITY, f64::min), lags().fold(f64::NEG_INFINITY, f64::max));
+        let mut fits: [Option<Fit>; crate::lag::MAX_PEAKS] = [None; crate::lag::MAX_PEAKS];
+        for (slot, peak) in fits.iter_mut().zip(peaks) {
+            *slot = self.refine(state, view, start, &support, peak.lag, room, in_bins).ok();
+        }
+        let Some(best) = fits.iter().flatten().copied().min_by(|a, b| a.residual.total_cmp(&b.residual)) else {
+            return Err(Reason::NoConvergence);
+        };
+        // The residual's signals are needed to tell how many independent samples it has.
+        let again = self.refine(state, view, start, &support, best.tau, 1.0, in_bins)?;
+        self.leave_residual(state, &again, start, &support);
+        let freedom = independent(&state.signals.measured[support.start - start..support.end - start]);
+        let floor = EXACT * best.products.oo;
+        let equal = |f: &Fit| {
+            let odds = 0.5 * freedom * (f.residual.max(floor) / best.residual.max(floor)).ln();
+            odds < LOG_ODDS && (f.tau - best.tau).abs() > 1.0
+        };
+        let mut chosen = best;
+        if let Some(other) = fits.iter().flatten().find(|f| equal(f)) {
+            if expected.is_none() {
+                let (delay_s, other_s) = (best.tau / self.rate_hz, other.tau / self.rate_hz);
+                return Err(Reason::Ambiguous { delay_s, other_s });
+            }
+            for f in fits.iter().flatten().filter(|f| equal(f)) {
+                if distance(f.tau) < distance(chosen.tau) {
+                    chosen = *f;
+                }
+            }
+        }
+        let support = around(chosen.tau, chosen.tau);
+        let fit = self.refine(state, view, start, &support, chosen.tau, room, in_bins)?;
+        Ok((fit, support))
+    }
+
+    /// The samples of the window for which the target is known at all delays from `least` to `most`, in samples.
+    fn support(&self, view: &View<'_>, start: usize, least: f64, most: f64) -> Range<usize> {
+        let before = (most.ceil() + (BEFORE + 1) as f64).max(0.0) as usize;
+        let after = ((-least).ceil() + (AFTER + 1) as f64).max(0.0) as usize;
+        let from = start.max(view.origin + before);
+        let to = (start + self.n_samples).min(view.end().saturating_sub(after));
+        from..to.max(from)
+    }
+
+    /// Newton's steps from `tau`, at most `room` samples away from it, on sums over samples or over the kept bins.
+    fn refine(
+        &self,
+        state: &mut AlignmentState,
+        view: &View<'_>,
+        start: usize,
+        support: &Range<usize>,
+        tau: f64,
+        room: f64,
+        in_bins: bool,
+    ) -> std::result::Result<Fit, Reason> {
+        if support.len() < MIN_SUPPORT || 2 * support.len() < self.n_samples {
+            return Err(Reason::TooShort { n_samples: support.len() });
+        }
+        self.place_measured(state, view, start, support);
+        if in_bins {
+            self.spectrum.transform_one(&mut state.scratch, &state.signals.measured, None, &mut state.bins[MEASURED]);
+        }
+        let (low, high) = (tau - room, tau + room);
+        // Where the score is known to be positive (the delay is larger) and negative.
+        let (mut below, mut above) = (low, high);
+        let mut now = tau;
+        let mut last: Option<(f64, f64)> = None;
+        for _ in 0..MAX_STEPS {
+            self.place_target(state, view, start, support, now);
+            let products =
+                if in_bins { self.products_in_bins(state) } else { self.products_in_time(state, start, support) };
+            let taps = Taps::at(fraction(now).1);
+            let Some(score) = self.score(&products, &taps, &state.weighting.correlation) else {
+                return Err(Reason::NoConvergence);
+            };
+            if score.value > 0.0 {
+                below = now
+            } else {
+                above = now
+            }
+            // The secant through the last two places, where it is of the size that the model predicts.
+            let mut slope = score.slope;
+            if let Some((tau, value)) = last
+                && (now - tau).abs() > 1e-3
+            {
+                let secant = (value - score.value) / (now - tau);
+                if secant > 0.02 * slope && secant < 4.0 * slope {
+                    slope = secant;
+                }
+            }
+            let step = score.value / slope;
+            if step.abs() < LAST_STEP || above - below < LAST_STEP {
+                let step = step.clamp(-LAST_STEP, LAST_STEP);
+                return Ok(Fit {
+                    tau: now + step,
+                    step,
+                    gain: score.gain,
+                    products,
+                    clean: score.clean,
+                    residual: score.residual,
+                });
+            }
+            last = Some((now, score.value));
+            let next = now + step;
+            now = if next > below && next < above { next } else { 0.5 * (below + above) };
+        }
+        Err(Reason::NoConvergence)
+    }
+
+    /// Measured over the judged samples, detrended and windowed.
+    fn place_measured(&self, state: &mut AlignmentState, view: &View<'_>, start: usize, support: &Range<usize>) {
+        let within = support.start - start..support.end - start;
+        let measured = &mut state.signals.measured;
+        clear_around(measured, &within);
+        measured[within.clone()]
+            .copy_from_slice(&view.measured[support.start - view.origin..support.end - view.origin]);
+        self.condition(measured, &within);
+    }
+
+    /// The target shifted by `tau` samples and its slope, treated as measured was.
+    fn place_target(
+        &self,
+        state: &mut AlignmentState,
+        view: &View<'_>,
+        start: usize,
+        support: &Range<usize>,
+        tau: f64,
+    ) {
+        let (whole, fraction) = fraction(tau);
+        let within = support.start - start..support.end - start;
+        let Signals { shifted, slope, .. } = &mut state.signals;
+        let from = (support.start - view.origin + NODES).saturating_add_signed(whole) - NODES - BEFORE;
+        let samples = &view.target[from..from + within.len() + NODES - 1];
+        for signal in [&mut *shifted, &mut *slope] {
+            clear_around(signal, &within);
+        }
+        self.arch.dispatch(Shift {
+            taps: &Taps::at(fraction),
+            samples,
+            value: &mut shifted[within.clone()],
+            slope: &mut slope[within.clone()],
+        });
+        self.condition(shifted, &within);
+        self.condition(slope, &within);
+    }
+
+    fn products_in_time(&self, state: &AlignmentState, start: usize, support: &Range<usize>) -> Products {
+        let within = support.start - start..support.end - start;
+        let Signals { measured, shifted, slope } = &state.signals;
+        self.arch.dispatch(Multiply {
+            shifted: &shifted[within.clone()],
+            slope: &slope[within.clone()],
+            measured: &measured[within],
+        })
+    }
+
+    fn products_in_bins(&self, state: &mut AlignmentState) -> Products {
+        let AlignmentState { signals, bins: [y, v, o], scratch, weighting, .. } = state;
+        let correction = self.factors(weighting);
+        self.spectrum.transform_one(scratch, &signals.shifted, None, y);
+        self.spectrum.transform_one(scratch, &signals.slope, None, v);
+        let pair = |a: &[Complex<f64>], b: &[Complex<f64>]| {
+            let mut cross = Cross { correction, first: self.spectrum.first(), ..Cross::default() };
+            self.spectrum.visit_pair([a, b], &mut cross);
+            let total = |lanes: [f64; LANES]| lanes.iter().sum::<f64>();
+            (total(cross.first_squared), total(cross.product), total(cross.second_squared))
+        };
+        let ((yy, yv, vv), (_, oy, oo), (_, ov, _)) = (pair(y, v), pair(y, o), pair(v, o));
+        Products { yy, yv, vv, oy, ov, oo }
+    }
+
+    /// What the bins are multiplied with before they are summed.
+    fn factors<'a>(&'a self, weighting: &'a Weighting) -> Option<&'a [f64]> {
+        if self.noise_ratio > 0.0 { Some(&weighting.factors) } else { self.correction.as_deref() }
+    }
+
+    /// Detrends and windows `signal` over `within`.
+    fn condition(&self, signal: &mut [f64], within: &Range<usize>) {
+        let samples = &mut signal[within.clone()];
+        if let Some(line) = self.detrend.line(samples) {
+            samples.iter_mut().enumerate().for_each(|(i, v)| *v -= line.at(i));
+        }
+        self.taper(samples, within);
+    }
+
+    fn taper(&self, samples: &mut [f64], within: &Range<usize>) {
+        if let Some(window) = &self.window {
+            samples.iter_mut().zip(&window[within.clone()]).for_each(|(v, w)| *v *= w);
+        }
+    }
+
+    /// The derivative of the objective with respect to the delay, up to a positive factor, at the best gain.
+    fn score(&self, p: &Products, taps: &Taps, correlation: &[f64; NODES]) -> Option<Score> {
+        let correlate = |a: &[f64; NODES], b: &[f64; NODES]| -> f64 {
+            let terms = (0..NODES).flat_map(|i| (0..NODES).map(move |j| (i, j)));
+            terms.map(|(i, j)| a[i] * b[j] * correlation[i.abs_diff(j)]).sum()
+        };
+        let (gain, noise, share) = if self.noise_ratio > 0.0 {
+            // Noise variances of measured over target; what interpolation leaves of the latter.
+            let lambda = 1.0 / (self.noise_ratio * self.noise_ratio);
+            let g = correlate(&taps.value, &taps.value);
+            let difference = p.yy * lambda - g * p.oo;
+            // The positive root of g oy K^2 + (lambda yy - g oo) K - lambda oy = 0.
+            let root = (difference * difference + 4.0 * g * lambda * p.oy * p.oy).sqrt();
+            let gain = if difference > 0.0 {
+                2.0 * lambda * p.oy / (difference + root)
+            } else {
+                (root - difference) / (2.0 * g * p.oy)
+            };
+            let residual = p.oo - 2.0 * gain * p.oy + gain * gain * p.yy;
+            (gain, residual.max(0.0) / (lambda + gain * gain * g), g)
+        } else {
+            (p.oy / p.yy, 0.0, 0.0)
+        };
+        let mut clean = *p;
+        let mut pull = 0.0;
+        if noise > 0.0 {
+            let cross = correlate(&taps.value, &taps.slope);
+            clean.yy -= noise * share;
+            clean.yv -= noise * cross;
+            clean.vv -= noise * correlate(&taps.slope, &taps.slope);
+            if clean.vv * clean.yy <= clean.yv * clean.yv {
+                clean.vv = p.vv;
+            }
+            // Interpolated noise is smaller between samples than on them; the objective does not reward that.
+            pull = noise * gain * cross;
+        }
+        // d/dtau of -|o - K y|^2 / 2 is -K <o - K y, y'>: with y' the slope in time, a delay larger than tau makes it positive.
+        let value = -(p.ov - gain * p.yv) - pull;
+        let slope = gain * (clean.vv - clean.yv * clean.yv / clean.yy);
+        let residual = (p.oo - 2.0 * gain * p.oy + gain * gain * p.yy).max(0.0);
+        let usable = gain > 0.0 && slope > 0.0 && slope.is_finite() && value.is_finite();
+        usable.then_some(Score { value, slope, gain, clean, residual })
+    }
+
+    /// measured becomes measured less the fit.
+    fn leave_residual(&self, state: &mut AlignmentState, fit: &Fit, start: usize, support: &Range<usize>) {
+        let within = support.start - start..support.end - start;
+        let Signals { measured, shifted, slope } = &mut state.signals;
+        let (shifted, slope) = (&shifted[within.clone()], &slope[within.clone()]);
+        for ((o, y), v) in measured[within].iter_mut().zip(shifted).zip(slope) {
+            *o -= fit.gain * (y - fit.step * v);
+        }
+    }
+
+    /// The autoregression of the residual that stands in measured's place.
+    fn autoregression(&self, state: &mut AlignmentState, start: usize, support: &Range<usize>) -> Autoregression {
+        let within = support.start - start..support.end - start;
+        let (squares, fourths) = self.window_moments(&within);
+        Autoregression::fit(self.arch, &state.signals.measured[within], squares * squares / fourths, &mut state.work)
+    }
+
+    /// sum w^2 and sum w^4 over the judged samples.
+    fn window_moments(&self, within: &Range<usize>) -> (f64, f64) {
+        match &self.window {
+            None => (within.len() as f64, within.len() as f64),
+            Some(w) => w[within.clone()].iter().fold((0.0, 0.0), |(s, q), w| (s + w * w, q + w * w * w * w)),
+        }
+    }
+
+    /// Iterates Eq 12 on the shifted target until its phase vanishes, from the least-squares delay.
+    fn align(
+        &self,
+        state: &mut AlignmentState,
+        view: &View<'_>,
+        start: usize,
+        support: &Range<usize>,
+        mut fit: Fit,
+    ) -> std::result::Result<Tracking, Reason> {
+        let from = fit.tau;
+        let mut last: Option<(f64, f64)> = None;
+        // Re sum Y' conj Y / sum |Y|^2: how the amplitude changes with the delay.
+        let mut growth = 0.0;
+        self.spectrum.transform_one(&mut state.scratch, &state.signals.measured, None, &mut state.bins[MEASURED]);
+        for _ in 0..MAX_STEPS {
+            let tau = fit.tau;
+            self.place_target(state, view, start, support, tau);
+            let AlignmentState { signals, bins: [y, v, o], scratch, .. } = &mut *state;
+            self.spectrum.transform_one(scratch, &signals.shifted, None, y);
+            let sums = |a: &[Complex<f64>], b: &[Complex<f64>]| {
+                weigh(&self.spectrum, self.correction.as_deref(), self.weight_power, [a, b])
+            };
+            let found = sums(y, o);
+            let fei = found.cross / found.power;
+            let quarter_turn = 0.25 * found.power / found.moment * self.rate_hz / self.spectrum.delta_f_hz();
+            let phase = fei.arg();
+            let mut slope =
+                2.0 * std::f64::consts::PI * found.moment / found.power * self.spectrum.delta_f_hz() / self.rate_hz;
+            match last {
+                Some((before, value)) if (tau - before).abs() > 1e-9 => {
+                    let secant = (phase - value) / (tau - before);
+                    if secant > 0.1 * slope && secant < 10.0 * slope {
+                        slope = secant;
+                    }
+                }
+                _ if self.weight_power == 2 => {
+                    // y moves by -y' a sample: d arg(sum O conj Y) = -Im(sum O conj Y' / sum O conj Y).
+                    self.spectrum.transform_one(scratch, &signals.slope, None, v);
+                    let exact = -(sums(v, o).cross / found.cross).im;
+                    if exact > 0.0 {
+                        slope = exact;
+                    }
+                    growth = sums(y, v).cross.re / found.power;
+                }
+                _ => {}
+            }
+            let step = -phase / slope;
+            if !step.is_finite() || (tau + step - from).abs() > quarter_turn {
+                return Err(Reason::NoConvergence);
+            }
+            if step.abs() < LAST_STEP {
+                fit = Fit { tau: tau + step, step, gain: fei.norm(), ..fit };
+                let mut tracking =
+                    self.finish(state, start, support, &fit, Some(Averaged { power: found.power, slope, growth }));
+                if self.weight_power != 2 && tracking.reason.is_none() {
+                    tracking = tracking.without_interval(Reason::WeightPower);
+                }
+                return Ok(tracking);
+            }
+            last = Some((tau, phase));
+            fit.tau = tau + step;
+        }
+        Err(Reason::NoConvergence)
+    }
+
+    /// The result of a fit whose signals stand in the state, with its precision; `averaged` where it is a weighted average.
+    fn finish(
+        &self,
+        state: &mut AlignmentState,
+        start: usize,
+        support: &Range<usize>,
+        fit: &Fit,
+        averaged: Option<Averaged>,
+    ) -> Tracking {
+        let within = support.start - start..support.end - start;
+        let n_judged = within.len() as f64;
+        let (sum, squares) =
+            state.signals.measured[within.clone()].iter().fold((0.0, 0.0), |(s, q), v| (s + v, q + v * v));
+        let spread = squares - sum * sum / n_judged;
+        self.leave_residual(state, fit, start, support);
+        let residual: f64 = state.signals.measured[within.clone()].iter().map(|v| v * v).sum();
+        let goodness = if spread > 0.0 { 1.0 - residual / spread } else { f64::NAN };
+        let noise = self.autoregression(state, start, support);
+        let AlignmentState {
+            signals: Signals { measured, shifted, slope },
+            bins: [y, v, e],
+            scratch,
+            spread: cells,
+            weighting,
+            ..
+        } = state;
+        // At zero frequency there is no bin, but there may be much of the target.
+        let zero = |x: &[f64]| x[within.clone()].iter().sum::<f64>();
+        self.spectrum.transform_one(scratch, measured, None, e);
+        if self.in_time {
+            self.spectrum.transform_one(scratch, shifted, None, y);
+        }
+        let sums = weigh(&self.spectrum, self.factors(weighting), self.weight_power, [y, e]);
+        let f_eq = sums.moment / sums.power * self.spectrum.delta_f_hz();
+        let delay_s = fit.tau / self.rate_hz;
+        let phase_rad = -2.0 * std::f64::consts::PI * f_eq * delay_s;
+        let mut tracking = Tracking {
+            fei: Complex::from_polar(fit.gain, phase_rad),
+            amplitude: fit.gain,
+            phase_rad: 0.0 + phase_rad,
+            delay_s,
+            equivalent_frequency_hz: f_eq,
+            goodness,
+            ..Tracking::undetermined(Reason::Still)
+        };
+        tracking.reason = None;
+        debug_assert!((delay(phase_rad, f_eq) - delay_s).abs() <= 1e-9 * delay_s.abs() || !delay_s.is_finite());
+        if goodness.is_nan() || goodness < MIN_GOODNESS {
+            return Tracking::undetermined(Reason::LowCoherence { goodness });
+        }
+        // The estimate is a sum over w (w y), so the noise is seen through the window twice.
+        if self.window.is_some() {
+            for (signal, bins) in [(&mut *shifted, &mut *y), (&mut *slope, &mut *v)] {
+                self.taper(&mut signal[within.clone()], &within);
+                self.spectrum.transform_one(scratch, signal, None, bins);
+            }
+        } else if self.in_time {
+            self.spectrum.transform_one(scratch, slope, None, v);
+        }
+        let (window_power, fourths) = self.window_moments(&within);
+        let folded = self.spectrum.folded_len() as f64;
+        let sampling = Sampling {
+            window_power,
+            bins_per_piece: (folded * fourths / (window_power * window_power)).max(1.0),
+            scale: 0.5 * folded.max(n_judged),
+        };
+        // Sums over samples are 2 / n times those over bins.
+        let to_bins = if self.in_time { 0.5 * self.spectrum.fft_len() as f64 } else { 1.0 };
+        let influence = match averaged {
+            // The parts of the noise in phase with the target and a quarter turn from it are independent.
+            Some(Averaged { power, slope, growth }) => Influence {
+                gain: [(1.0 + (growth / slope).powi(2)).sqrt() / power, 0.0],
+                delay: [1.0 / (power * fit.gain * slope), 0.0],
+                leverage: [2.0 / power, 0.0, 0.0],
+            },
+            None => {
+                let Products { yy, yv, vv, .. } = fit.clean;
+                let determinant = (yy * vv - yv * yv) * to_bins;
+                Influence {
+                    gain: [vv / determinant, -yv / determinant],
+                    delay: [yv / determinant / fit.gain, -yy / determinant / fit.gain],
+                    leverage: [vv / determinant, -yv / determinant, yy / determinant],
+                }
+            }
+        };
+        let first = self.spectrum.first();
+        let noisy_target = (self.noise_ratio > 0.0).then(|| NoisyTarget {
+            weights: &weighting.weights,
+            share: fit.gain / (self.noise_ratio.powi(-2) + fit.gain * fit.gain),
+        });
+        let correction = self.correction.as_deref();
+        let mut spread =
+            Spread::new(cells, first, &self.cosines, correction, &noise, influence, sampling, noisy_target);
+        self.spectrum.visit_pair([y, v], &mut spread);
+        spread.residual_next();
+        self.spectrum.visit_pair([y, e], &mut spread);
+        if self.in_time {
+            spread.zero_frequency(zero(shifted), zero(slope), zero(measured));
+        }
+        match spread.precision(within.len()) {
+            None => tracking.without_interval(Reason::FewBins),
+            Some(precision) => self.with_precision(tracking, &precision, residual <= EXACT * squares),
+        }
+    }
+
+    fn with_precision(&self, mut tracking: Tracking, precision: &Precision, exact: bool) -> Tracking {
+        tracking.residual_coherence = precision.coherence;
+        if precision.coherent && !exact {
+            return tracking.without_interval(Reason::ResidualFollowsTarget { coherence: precision.coherence });
+        }
+        let Precision { gain_std, gain_reach, delay_std, delay_reach, .. } = *precision;
+        let (delay_std, delay_reach) = (delay_std / self.rate_hz, delay_reach / self.rate_hz);
+        // Wider than half a turn says nothing of the delay.
+        if !(delay_reach * tracking.equivalent_frequency_hz < 0.25) {
+            return Tracking::undetermined(Reason::LowCoherence { goodness: tracking.goodness });
+        }
+        tracking.amplitude_std = gain_std;
+        tracking.amplitude_interval = (tracking.amplitude - gain_reach, tracking.amplitude + gain_reach);
+        tracking.delay_std_s = delay_std;
+        tracking.delay_interval_s = (tracking.delay_s - delay_reach, tracking.delay_s + delay_reach);
+        tracking
+    }
+
+    /// The delay of the highest correlation peak of the whole record, in samples, where no other comes near it.
+    pub(crate) fn expected(pair: &crate::Pair<'_>, max_delay_s: f64) -> Option<f64> {
+        let search = Search::new(pair.n_samples(), max_delay_s * pair.rate_hz());
+        let peaks = search.peaks(&mut search.state(), &View::whole(pair), 0)?;
+        match peaks.peaks() {
+            [only] => Some(only.lag),
+            _ => None,
+        }
+    }
+}
+
+/// What the precision of a weighted average depends on.
+#[derive(Debug, Clone, Copy)]
+struct Averaged {
+    /// sum |Y|^2 over the bins.
+    power: f64,
+    /// Of the phase over the delay, in radians a sample.
+    slope: f64,
+    /// Of log A over the delay, a sample.
+    growth: f64,
+}
+
+/// A score and what goes with it.
+struct Score {
+    value: f64,
+    slope: f64,
+    gain: f64,
+    clean: Products,
+    residual: f64,
+}
+
+/// The sample that precedes t - tau, relative to t, and the way to the next.
+fn fraction(tau: f64) -> (isize, f64) {
+    let whole = (-tau).floor();
+    (whole as isize, -tau - whole)
+}
+
+impl Weighting {
+    /// From the energies in `weights` and |O_k - K Y_k|^2 in `factors` to the weights, over `width` bins at a time. `share` of
+    /// the residual's energy is the target's noise, which is taken for white.
+    fn learn(&mut self, width: usize, share: f64) {
+        let noise = share * self.factors.iter().sum::<f64>() / self.factors.len() as f64;
+        for weights in self.weights.chunks_mut(width) {
+            let energy = weights.iter().sum::<f64>() / weights.len() as f64;
+            weights.fill(if energy > CLEAR * noise { 1.0 - noise / energy } else { 0.0 });
+        }
+        if self.weights.iter().all(|&w| w == 0.0) {
+            self.weights.fill(1.0);
+        }
+    }
+
+    /// What follows from the weights.
+    fn refresh(&mut self, correction: Option<&[f64]>, cosines: &[f64]) {
+        let mut sums = [0.0; NODES];
+        for (k, (weight, factor)) in self.weights.iter().zip(&mut self.factors).enumerate() {
+            *factor = weight.sqrt() * correction.map_or(1.0, |c| c[k]);
+            let (mut now, mut next) = (*weight, weight * cosines[k]);
+            for sum in &mut sums {
+                *sum += now;
+                (now, next) = (next, 2.0 * cosines[k] * next - now);
+            }
+        }
+        self.correlation = sums.map(|s| s / sums[0]);
+    }
+}
+
+/// Zeroes what lies outside `within`.
+fn clear_around(signal: &mut [f64], within: &Range<usize>) {
+    signal[..within.start].fill(0.0);
+    signal[within.end..].fill(0.0);
+}
+
+/// Independent samples among coloured ones, by the correlation of neighbours.
+fn independent(samples: &[f64]) -> f64 {
+    let squares: f64 = samples.iter().map(|v| v * v).sum();
+    let products: f64 = samples.windows(2).map(|w| w[0] * w[1]).sum();
+    let r = if squares > 0.0 { (products / squares).clamp(-0.9999, 0.9999) } else { 0.0 };
+    samples.len() as f64 * (1.0 - r * r) / (1.0 + r * r)
+}
+
+/// [`Taps::apply`] compiled for the processor at hand.
+struct Shift<'a> {
+    taps: &'a Taps,
+    samples: &'a [f64],
+    value: &'a mut [f64],
+    slope: &'a mut [f64],
+}
+
+impl WithSimd for Shift<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        self.taps.apply(simd, self.samples, self.value, self.slope);
+    }
+}
+
+/// All inner products in one pass.
+struct Multiply<'a> {
+    shifted: &'a [f64],
+    slope: &'a [f64],
+    measured: &'a [f64],
+}
+
+impl NullaryFnOnce for Multiply<'_> {
+    type Output = Products;
+
+    #[inline(always)]
+    fn call(self) -> Products {
+        const WIDE: usize = 8;
+        let mut lanes = [[0.0; WIDE]; 6];
+        let n = self.shifted.len() / WIDE * WIDE;
+        let mut add = |i: usize, y: f64, v: f64, o: f64| {
+            for (lane, term) in lanes.iter_mut().zip([y * y, y * v, v * v, o * y, o * v, o * o]) {
+                lane[i] += term;
+            }
+        };
+        for ((y, v), o) in
+            self.shifted.chunks_exact(WIDE).zip(self.slope.chunks_exact(WIDE)).zip(self.measured.chunks_exact(WIDE))
+        {
+            for i in 0..WIDE {
+                add(i, y[i], v[i], o[i]);
+            }
+        }
+        for i in n..self.shifted.len() {
+            add(i - n, self.shifted[i], self.slope[i], self.measured[i]);
+        }
+        let [yy, yv, vv, oy, ov, oo] = lanes.map(|lane| lane.iter().sum());
+        Products { yy, yv, vv, oy, ov, oo }
+    }
+}
+
+/// Keeps (|Y_k|^2 + r^2 |O_k|^2) / 2, r the noise ratio, and |O_k - K Y_k|^2. Noise that lifts the one lifts or lowers the
+/// other as often as not; of |Y_k|^2 alone, weights would favour bins in which the target's noise adds to it.
+struct Energies<'a> {
+    gain: f64,
+    ratio: f64,
+    first: usize,
+    correction: Option<&'a [f64]>,
+    energy: &'a mut [f64],
+    residual: &'a mut [f64],
+}
+
+impl Sink for Energies<'_> {
+    fn take<const W: usize>(&mut self, bins: &Bins<W>) {
+        for i in 0..W {
+            let k = bins.first - self.first + i;
+            let factor = self.correction.map_or(1.0, |c| c[k]);
+            let target = Complex::new(bins.target_re[i], bins.target_im[i]) * factor;
+            let measured = Complex::new(bins.measured_re[i], bins.measured_im[i]) * factor;
+            self.energy[k] = 0.5 * (target.norm_sqr() + self.ratio * self.ratio * measured.norm_sqr());
+            self.residual[k] = (measured - target * self.gain).norm_sqr();
+        }
+    }
+}
+
+/// sum |a|^2, sum Re(a conj b) and sum |b|^2 over the kept bins.
+#[derive(Default)]
+struct Cross<'a> {
+    correction: Option<&'a [f64]>,
+    first: usize,
+    first_squared: [f64; LANES],
+    product: [f64; LANES],
+    second_squared: [f64; LANES],
+}
+
+impl Sink for Cross<'_> {
+    #[inline(always)]
+    fn take<const W: usize>(&mut self, bins: &Bins<W>) {
+        for i in 0..W {
+            let (ar, ai) = (bins.target_re[i], bins.target_im[i]);
+            let (br, bi) = (bins.measured_re[i], bins.measured_im[i]);
+            let factor = self.correction.map_or(1.0, |c| c[bins.first - self.first + i]);
+            let squared = factor * factor;
+            self.first_squared[i] += squared * (ar * ar + ai * ai);
+            self.product[i] += squared * (ar * br + ai * bi);
+            self.second_squared[i] += squared * (br * br + bi * bi);
+        }
+    }
+}

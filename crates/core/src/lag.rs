@@ -1,0 +1,288 @@
+//! Where the search for the delay starts: the peaks of the normalised correlation of measured and shifted target.
+//!
+//! ```text
+//! rho(l) = sum o_i (x_(i-l) - mean_l) / sqrt(sum o_i^2  sum (x_(i-l) - mean_l)^2),   o = measured less its mean
+//! ```
+//!
+//! summed over the judged samples, the target taken from outside the window where there is some; each lag is divided by the
+//! energy of its own stretch of target. Both signals are first averaged over as many samples as leave nine tenths of the
+//! target's energy (a straight line taken out): a peak needs no more resolution than a fifth of the shortest period.
+
+use pulp::{Arch, NullaryFnOnce};
+
+use crate::pair::Pair;
+use crate::window::Detrend;
+
+/// Averaging may cost this share of the target's energy.
+const KEPT_ENERGY: f64 = 0.9;
+/// Samples that are averaged at most.
+const MAX_STEP: usize = 64;
+/// Averaged samples that are correlated at most: the stretch in which the target moves most.
+const MAX_STRETCH: usize = 8192;
+/// Places at which a stretch may start.
+const STRETCH_STEP: usize = 1024;
+/// Peaks that are looked at.
+pub(crate) const MAX_PEAKS: usize = 4;
+/// A peak lower than the highest by more than this is another lag's, even at the resolution of the search.
+const PEAK_MARGIN: f64 = 0.05;
+
+/// A stretch of both signals, by their index in the record.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct View<'a> {
+    pub(crate) target: &'a [f64],
+    pub(crate) measured: &'a [f64],
+    /// Index in the record of the first sample of both.
+    pub(crate) origin: usize,
+}
+
+impl<'a> View<'a> {
+    /// The whole of a record.
+    pub(crate) fn whole(pair: &Pair<'a>) -> Self {
+        Self { target: pair.target(), measured: pair.measured(), origin: 0 }
+    }
+
+    /// Index in the record past the last sample.
+    pub(crate) fn end(&self) -> usize {
+        self.origin + self.target.len()
+    }
+}
+
+/// A place from which the delay may be refined.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Peak {
+    /// In samples; positive when measured lags.
+    pub(crate) lag: f64,
+    pub(crate) correlation: f64,
+}
+
+/// What the search saw.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Peaks {
+    peaks: [Peak; MAX_PEAKS],
+    n_peaks: usize,
+    /// The lowest correlation at any lag.
+    pub(crate) lowest: f64,
+    /// Samples from one lag looked at to the next.
+    pub(crate) step: usize,
+    /// Cycles that the target moves through in the window, a straight line taken out: its velocity over its displacement.
+    pub(crate) cycles: f64,
+}
+
+impl Peaks {
+    /// Highest first; only those that may be as high as the first.
+    pub(crate) fn peaks(&self) -> &[Peak] {
+        &self.peaks[..self.n_peaks]
+    }
+}
+
+/// The plan for windows of one length.
+#[derive(Debug, Clone)]
+pub(crate) struct Search {
+    n_samples: usize,
+    /// Largest number of samples averaged.
+    max_step: usize,
+    /// Largest lag looked at, a multiple of it.
+    reach: usize,
+    arch: Arch,
+}
+
+/// Buffers of a search.
+#[derive(Debug, Clone)]
+pub(crate) struct SearchState {
+    target: Vec<f64>,
+    measured: Vec<f64>,
+    correlations: Vec<f64>,
+}
+
+impl Search {
+    /// For windows of `n_samples`, lags of up to `max_delay` samples either way (a quarter of the window at most).
+    pub(crate) fn new(n_samples: usize, max_delay: f64) -> Self {
+        let wanted = (max_delay.ceil() as usize).clamp(1, (n_samples / 4).max(1));
+        let most = MAX_STEP.min(wanted / 4).min(n_samples / 64).max(1);
+        let max_step = 1 << most.ilog2();
+        Self { n_samples, max_step, reach: wanted.next_multiple_of(max_step), arch: Arch::new() }
+    }
+
+    /// The largest lag looked at, in samples.
+    pub(crate) fn reach(&self) -> usize {
+        self.reach
+    }
+
+    pub(crate) fn state(&self) -> SearchState {
+        let longest = self.n_samples + 2 * self.reach;
+        SearchState {
+            target: vec![0.0; longest],
+            measured: vec![0.0; self.n_samples],
+            correlations: vec![0.0; 2 * self.reach + 1],
+        }
+    }
+
+    /// The peaks for the window that starts at sample `start` of the record; `None` where too few samples can be compared
+    /// or one of the signals does not move.
+    pub(crate) fn peaks(&self, state: &mut SearchState, view: &View<'_>, start: usize) -> Option<Peaks> {
+        let from = start.max(view.origin + self.reach);
+        let to = (start + self.n_samples).min(view.end().saturating_sub(self.reach));
+        if to < from + 2 * self.max_step.max(4) {
+            return None;
+        }
+        let SearchState { target, measured, correlations } = state;
+        let (first, last) = (from - self.reach - view.origin, to + self.reach - view.origin);
+        let (mut n_target, mut n) = (last - first, to - from);
+        let asked = &view.target[first..last];
+        copy_less_line(asked, &asked[self.reach..self.reach + n], self.reach, &mut target[..n_target]);
+        let answered = &view.measured[from - view.origin..to - view.origin];
+        copy_less_line(answered, answered, 0, &mut measured[..n]);
+        let energy = |x: &[f64]| x.iter().map(|v| v * v).sum::<f64>();
+        let all = energy(&target[self.reach..self.reach + n]);
+        let mut step = 1;
+        while step < self.max_step {
+            // Averages of two, in place; kept if they still hold the energy.
+            let next = 2 * step;
+            let reach = self.reach / next;
+            let held: f64 = (0..n / 2)
+                .map(|i| {
+                    let j = 2 * (reach + i);
+                    let v = 0.5 * (target[j] + target[j + 1]);
+                    v * v
+                })
+                .sum();
+            if held * (next as f64) < KEPT_ENERGY * all {
+                break;
+            }
+            n_target = halve(&mut target[..n_target]);
+            n = halve(&mut measured[..n]);
+            step = next;
+        }
+        let reach = self.reach / step;
+        let cycles = cycles(&target[reach..reach + n]);
+        let at = liveliest(&target[reach..reach + n]);
+        let n = n.min(MAX_STRETCH);
+        let (target, measured) = (&target[at..at + n + 2 * reach], &mut measured[at..at + n]);
+        let mean = measured.iter().sum::<f64>() / n as f64;
+        measured.iter_mut().for_each(|v| *v -= mean);
+        let spread = energy(measured);
+        let correlations = &mut correlations[..2 * reach + 1];
+        self.arch.dispatch(Correlate { target, measured, out: correlations });
+        let round_off = 1e-13 * energy(target);
+        let (mut sum, mut squares): (f64, f64) = target[..n].iter().fold((0.0, 0.0), |(s, q), v| (s + v, q + v * v));
+        let mut moved = false;
+        for k in 0..correlations.len() {
+            let own = squares - sum * sum / n as f64;
+            let comparable = own > round_off && spread > 0.0;
+            moved |= comparable;
+            correlations[k] = if comparable { correlations[k] / (own * spread).sqrt() } else { 0.0 };
+            if k + 1 < correlations.len() {
+                let (leaves, enters) = (target[k], target[k + n]);
+                sum += enters - leaves;
+                squares += enters * enters - leaves * leaves;
+            }
+        }
+        if !moved {
+            return None;
+        }
+        // Entry k compares with the target k - reach steps later: the lag falls with k.
+        let lag = |k: f64| (reach as f64 - k) * step as f64;
+        let mut found = Peaks {
+            peaks: [Peak::default(); MAX_PEAKS],
+            n_peaks: 0,
+            lowest: correlations.iter().copied().fold(f64::INFINITY, f64::min),
+            step,
+            cycles,
+        };
+        for k in 0..correlations.len() {
+            let here = correlations[k];
+            let before = if k == 0 { f64::NEG_INFINITY } else { correlations[k - 1] };
+            let after = if k + 1 == correlations.len() { f64::NEG_INFINITY } else { correlations[k + 1] };
+            if here < before || here <= after || here.is_nan() {
+                continue;
+            }
+            let curvature = before + after - 2.0 * here;
+            let inside = curvature.is_finite() && curvature < 0.0;
+            let shift = if inside { (0.5 * (before - after) / curvature).clamp(-0.5, 0.5) } else { 0.0 };
+            let top = if inside { here + 0.25 * (after - before) * shift } else { here };
+            found.keep(Peak { lag: lag(k as f64 + shift), correlation: top });
+        }
+        let best = found.peaks[0].correlation;
+        found.n_peaks = found.peaks[..found.n_peaks].iter().filter(|p| p.correlation >= best - PEAK_MARGIN).count();
+        (found.n_peaks > 0).then_some(found)
+    }
+}
+
+impl Peaks {
+    /// Inserts in order, dropping the lowest.
+    fn keep(&mut self, peak: Peak) {
+        let at =
+            self.peaks[..self.n_peaks].iter().position(|p| p.correlation < peak.correlation).unwrap_or(self.n_peaks);
+        if at < MAX_PEAKS {
+            self.n_peaks = (self.n_peaks + 1).min(MAX_PEAKS);
+            self.peaks[at..self.n_peaks].rotate_right(1);
+            self.peaks[at] = peak;
+        }
+    }
+}
+
+/// out = samples less the least-squares line of `own`, which starts at index `offset` of them.
+fn copy_less_line(samples: &[f64], own: &[f64], offset: usize, out: &mut [f64]) {
+    let Some(line) = Detrend::Linear.line(own) else { return out.copy_from_slice(samples) };
+    for (i, (y, x)) in out.iter_mut().zip(samples).enumerate() {
+        *y = x - line.at_f64(i as f64 - offset as f64);
+    }
+}
+
+/// Averages neighbours in place; returns how many there are now.
+fn halve(samples: &mut [f64]) -> usize {
+    let n = samples.len() / 2;
+    for i in 0..n {
+        samples[i] = 0.5 * (samples[2 * i] + samples[2 * i + 1]);
+    }
+    n
+}
+
+/// Cycles of a motion in its samples, by its rms velocity over its rms displacement.
+fn cycles(samples: &[f64]) -> f64 {
+    let squares: f64 = samples.iter().map(|v| v * v).sum();
+    let steps: f64 = samples.windows(2).map(|w| (w[1] - w[0]) * (w[1] - w[0])).sum();
+    if squares > 0.0 { samples.len() as f64 * (steps / squares).sqrt() / (2.0 * std::f64::consts::PI) } else { 0.0 }
+}
+
+/// Where the [`MAX_STRETCH`] samples of most energy start.
+fn liveliest(samples: &[f64]) -> usize {
+    if samples.len() <= MAX_STRETCH {
+        return 0;
+    }
+    let energy = |x: &[f64]| x.iter().map(|v| v * v).sum::<f64>();
+    let starts = (0..=samples.len() - MAX_STRETCH).step_by(STRETCH_STEP);
+    starts
+        .map(|s| (s, energy(&samples[s..s + MAX_STRETCH])))
+        .fold((0, f64::NEG_INFINITY), |best, next| if next.1 > best.1 { next } else { best })
+        .0
+}
+
+/// out[k] = sum_i measured[i] target[i + k], compiled for the processor at hand.
+struct Correlate<'a> {
+    target: &'a [f64],
+    measured: &'a [f64],
+    out: &'a mut [f64],
+}
+
+impl NullaryFnOnce for Correlate<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        const LANES: usize = 32;
+        let n = self.measured.len();
+        for (k, out) in self.out.iter_mut().enumerate() {
+            let target = &self.target[k..k + n];
+            let (a, b) = (self.measured.chunks_exact(LANES), target.chunks_exact(LANES));
+            let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(x, y)| x * y).sum();
+            let mut lanes = [0.0; LANES];
+            for (x, y) in a.zip(b) {
+                for i in 0..LANES {
+                    lanes[i] += x[i] * y[i];
+                }
+            }
+            *out = lanes.iter().sum::<f64>() + rest;
+        }
+    }
+}

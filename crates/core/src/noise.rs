@@ -1,0 +1,414 @@
+//! What the residual says of the noise: its autoregression, and from its spectrum the variance of what was estimated.
+//!
+//! An estimate is linear in the noise e where it is small, theta - theta_0 = sum u_i e_i, so that its variance is the mean
+//! over frequency of |U_k|^2 S_k, S the noise's spectrum. S is taken from the residual: whitened by an autoregression, its
+//! periodogram is flat enough to be averaged over wide blocks of bins, each corrected for what the fit has taken out of it.
+
+use num_complex::Complex;
+use pulp::{Arch, NullaryFnOnce};
+
+use crate::quantile::student_t_975;
+use crate::spectrum::{Bins, Sink};
+
+/// Highest order of the autoregression.
+pub(crate) const MAX_ORDER: usize = 4;
+/// Independent bins in which the residual is compared with the target: within them gain and delay are one number.
+const FINE: f64 = 8.0;
+/// Independent bins from which a spectrum can be estimated at all.
+const FEWEST: f64 = 16.0;
+
+/// x_i = -a_1 x_(i-1) - ... - a_p x_(i-p) + white noise; coefficients start with 1.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Autoregression {
+    pub(crate) coefficients: [f64; MAX_ORDER + 1],
+    pub(crate) order: usize,
+}
+
+impl Autoregression {
+    pub(crate) const WHITE: Self = Self { coefficients: [1.0, 0.0, 0.0, 0.0, 0.0], order: 0 };
+
+    /// Fits `samples` (Burg 1967), the order by the Bayesian information criterion for `n_effective` samples; `scratch` is
+    /// twice as long as `samples`.
+    pub(crate) fn fit(arch: Arch, samples: &[f64], n_effective: f64, scratch: &mut [f64]) -> Self {
+        let n = samples.len();
+        let (forward, rest) = scratch.split_at_mut(n);
+        let backward = &mut rest[..n];
+        forward.copy_from_slice(samples);
+        backward.copy_from_slice(samples);
+        let mut now = Self::WHITE;
+        let mut best = Self::WHITE;
+        // n log(variance) + order log n, relative to order 0.
+        let (mut criterion, mut least) = (0.0, 0.0);
+        for order in 1..=MAX_ORDER.min(n / 8) {
+            let m = n - order;
+            let (f, b) = (&mut forward[order..], &mut backward[..m]);
+            let (cross, energy) = arch.dispatch(BurgSums { forward: f, backward: b });
+            if !(energy > 0.0 && cross.is_finite()) {
+                break;
+            }
+            let reflection = (-2.0 * cross / energy).clamp(-1.0, 1.0);
+            arch.dispatch(BurgStep { forward: f, backward: b, reflection });
+            let previous = now.coefficients;
+            for i in 1..=order {
+                now.coefficients[i] += reflection * previous[order - i];
+            }
+            now.order = order;
+            criterion += n_effective * (1.0 - reflection * reflection).max(f64::MIN_POSITIVE).ln() + n_effective.ln();
+            if criterion < least {
+                (best, least) = (now, criterion);
+            } else if order >= best.order + 2 {
+                break;
+            }
+        }
+        best
+    }
+
+    /// Autocorrelation of the coefficients: |A(omega)|^2 = r_0 + 2 sum r_l cos(l omega).
+    fn response(&self) -> [f64; MAX_ORDER + 1] {
+        let a = &self.coefficients;
+        std::array::from_fn(|l| (0..=MAX_ORDER - l).map(|i| a[i] * a[i + l]).sum())
+    }
+
+    /// out[i] = x_i + a_1 x_(i-1) + ...: what is unpredictable in `samples`, which has `order` samples more in front.
+    pub(crate) fn whiten(&self, samples: &[f64], out: &mut [f64]) {
+        let p = self.order;
+        let n = samples.len() - p;
+        for i in 0..n {
+            let mut sum = samples[i + p];
+            for k in 1..=p {
+                sum += self.coefficients[k] * samples[i + p - k];
+            }
+            out[i] = sum;
+        }
+    }
+}
+
+/// sum f_i b_i and sum f_i^2 + b_i^2
+struct BurgSums<'a> {
+    forward: &'a [f64],
+    backward: &'a [f64],
+}
+
+impl NullaryFnOnce for BurgSums<'_> {
+    type Output = (f64, f64);
+
+    #[inline(always)]
+    fn call(self) -> (f64, f64) {
+        const LANES: usize = 16;
+        let (mut cross, mut energy) = ([0.0; LANES], [0.0; LANES]);
+        let (f, b) = (self.forward.chunks_exact(LANES), self.backward.chunks_exact(LANES));
+        for (f, b) in f.remainder().iter().zip(b.remainder()) {
+            cross[0] += f * b;
+            energy[0] += f * f + b * b;
+        }
+        for (f, b) in f.zip(b) {
+            for i in 0..LANES {
+                cross[i] += f[i] * b[i];
+                energy[i] += f[i] * f[i] + b[i] * b[i];
+            }
+        }
+        (cross.iter().sum(), energy.iter().sum())
+    }
+}
+
+/// f += r b, b += r f
+struct BurgStep<'a> {
+    forward: &'a mut [f64],
+    backward: &'a mut [f64],
+    reflection: f64,
+}
+
+impl NullaryFnOnce for BurgStep<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for (f, b) in self.forward.iter_mut().zip(self.backward) {
+            let (x, y) = (*f, *b);
+            *f = x + self.reflection * y;
+            *b = y + self.reflection * x;
+        }
+    }
+}
+
+/// Which combinations of displacement and velocity give the estimates: U = sum_j weights_j G_j, G = (y, y') at the bins.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Influence {
+    /// Of the gain, of y and y'.
+    pub(crate) gain: [f64; 2],
+    /// Of the delay in samples.
+    pub(crate) delay: [f64; 2],
+    /// h_k = y^2 leverage[0] + 2 y y' leverage[1] + y'^2 leverage[2]: what the fit takes out of a bin; sums to 2.
+    pub(crate) leverage: [f64; 3],
+}
+
+/// What the bins are to the samples.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sampling {
+    /// sum w^2 over the judged samples: the energy of unit white noise in a bin.
+    pub(crate) window_power: f64,
+    /// Neighbouring bins that share one independent piece of noise: from zero-padding and tapering.
+    pub(crate) bins_per_piece: f64,
+    /// From sum |U_k|^2 S_k over the bins to the variance.
+    pub(crate) scale: f64,
+}
+
+/// Sums over a few neighbouring bins.
+#[derive(Debug, Clone, Copy, Default)]
+struct Cell {
+    n: f64,
+    /// |U|^2 / |A|^2 of gain and delay.
+    gain: f64,
+    delay: f64,
+    leverage: f64,
+    target: f64,
+    /// |E|^2 |A|^2
+    whitened: f64,
+    residual: f64,
+    cross_re: f64,
+    cross_im: f64,
+}
+
+/// Standard deviations, and how far to go to either side of an estimate.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Precision {
+    pub(crate) gain_std: f64,
+    pub(crate) gain_reach: f64,
+    /// In samples.
+    pub(crate) delay_std: f64,
+    pub(crate) delay_reach: f64,
+    /// Share of the residual, where the target has its energy, that follows the target at a gain of its own per frequency.
+    pub(crate) coherence: f64,
+    /// Whether that is more than noise can do.
+    pub(crate) coherent: bool,
+}
+
+/// Adds up, cell by cell, what is needed of the bins. `cosines[k - first]` is cos of the bin's frequency in radians a sample.
+pub(crate) struct Spread<'a> {
+    cells: &'a mut [Cell],
+    width: usize,
+    first: usize,
+    cosines: &'a [f64],
+    correction: Option<&'a [f64]>,
+    whitening: [f64; MAX_ORDER + 1],
+    influence: Influence,
+    sampling: Sampling,
+    noisy_target: Option<NoisyTarget<'a>>,
+    /// Whether the pair is (y, y') or (y, residual).
+    residual: bool,
+}
+
+/// What noise on the target adds.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct NoisyTarget<'a> {
+    /// Of the kept bins in the fit.
+    pub(crate) weights: &'a [f64],
+    /// The residual holds -K times the target's noise: sum E conj Y is minus this share of sum |E|^2 by that alone.
+    pub(crate) share: f64,
+}
+
+/// Bins to a cell, where so many share one independent piece of noise.
+pub(crate) fn cell_width(bins_per_piece: f64) -> usize {
+    ((FINE * bins_per_piece).ceil() as usize).max(1)
+}
+
+/// Cells of one estimate.
+#[derive(Debug, Clone)]
+pub(crate) struct SpreadState(Vec<Cell>);
+
+impl SpreadState {
+    /// For `n_bins` bins; a cell holds at least [`FINE`] of them.
+    pub(crate) fn new(n_bins: usize) -> Self {
+        Self(vec![Cell::default(); n_bins / FINE as usize + 2])
+    }
+}
+
+impl<'a> Spread<'a> {
+    /// `first` is the index of the first kept bin.
+    pub(crate) fn new(
+        state: &'a mut SpreadState,
+        first: usize,
+        cosines: &'a [f64],
+        correction: Option<&'a [f64]>,
+        noise: &Autoregression,
+        influence: Influence,
+        sampling: Sampling,
+        noisy_target: Option<NoisyTarget<'a>>,
+    ) -> Self {
+        let width = cell_width(sampling.bins_per_piece);
+        let cells = &mut state.0[..cosines.len().div_ceil(width)];
+        cells.fill(Cell::default());
+        Self {
+            cells,
+            width,
+            first,
+            cosines,
+            correction,
+            whitening: noise.response(),
+            influence,
+            sampling,
+            noisy_target,
+            residual: false,
+        }
+    }
+
+    /// What comes now is pairs of y and residual.
+    pub(crate) fn residual_next(&mut self) {
+        self.residual = true;
+    }
+
+    /// The bin at zero frequency, which stands for half a pair of bins.
+    pub(crate) fn zero_frequency(&mut self, y: f64, velocity: f64, residual: f64) {
+        let whitening = self.whitening[0] + 2.0 * self.whitening[1..].iter().sum::<f64>();
+        let Influence { gain, delay, leverage } = self.influence;
+        let cell = &mut self.cells[0];
+        cell.n += 0.5;
+        let (g, d) = (gain[0] * y + gain[1] * velocity, delay[0] * y + delay[1] * velocity);
+        cell.gain += 0.5 * g * g / whitening;
+        cell.delay += 0.5 * d * d / whitening;
+        cell.leverage +=
+            0.5 * (leverage[0] * y * y + 2.0 * leverage[1] * y * velocity + leverage[2] * velocity * velocity);
+        cell.target += 0.5 * y * y;
+        cell.whitened += 0.5 * residual * residual * whitening;
+        cell.residual += 0.5 * residual * residual;
+        cell.cross_re += 0.5 * residual * y;
+    }
+
+    /// The precision, with the noise's spectrum taken from blocks of n^0.4 independent bins to either side; `None` where
+    /// there are too few bins for one.
+    pub(crate) fn precision(&self, n_samples: usize) -> Option<Precision> {
+        let Sampling { window_power, bins_per_piece, scale } = self.sampling;
+        let pieces = self.cells.iter().map(|c| c.n).sum::<f64>() / bins_per_piece;
+        if pieces < FEWEST {
+            return None;
+        }
+        let half = (n_samples as f64).powf(0.4).max(FEWEST);
+        let cells_per_block = ((2.0 * half / FINE).round() as usize).clamp(1, self.cells.len());
+        // A last block that is not full joins the one before it.
+        let n_blocks = (self.cells.len() / cells_per_block).max(1);
+        let (mut gain, mut delay) = (Variance::default(), Variance::default());
+        for b in 0..n_blocks {
+            let to = if b + 1 == n_blocks { self.cells.len() } else { (b + 1) * cells_per_block };
+            let cells = &self.cells[b * cells_per_block..to];
+            let sum = |of: fn(&Cell) -> f64| cells.iter().map(of).sum::<f64>();
+            let n = sum(|c| c.n);
+            let expected = n * window_power - scale * sum(|c| c.leverage);
+            // A block of which the fit leaves less than a tenth of a bin says nothing of the noise.
+            let density = sum(|c| c.whitened) / expected.max(0.1 * window_power);
+            let pieces = (expected / window_power / bins_per_piece).max(0.1);
+            gain.add(scale * sum(|c| c.gain), density, pieces);
+            delay.add(scale * sum(|c| c.delay), density, pieces);
+        }
+        let (coherence, coherent) = self.coherence();
+        Some(Precision {
+            gain_std: gain.value.sqrt(),
+            gain_reach: gain.reach(),
+            delay_std: delay.value.sqrt(),
+            delay_reach: delay.reach(),
+            coherence,
+            coherent,
+        })
+    }
+
+    /// Coherence of residual and target over the cells that together hold all but a thousandth of the target's energy.
+    fn coherence(&self) -> (f64, bool) {
+        let total: f64 = self.cells.iter().map(|c| c.target).sum();
+        let least = 1e-3 * total / self.cells.len() as f64;
+        let (mut explained, mut all, mut shares, mut n) = (0.0, 0.0, 0.0, 0.0_f64);
+        for c in self.cells.iter().filter(|c| c.target > least && c.residual > 0.0) {
+            let own = self.noisy_target.map_or(0.0, |n| n.share * c.residual);
+            let cross = Complex::new(c.cross_re + own, c.cross_im).norm_sqr() / c.target;
+            explained += cross;
+            all += c.residual;
+            shares += cross / c.residual;
+            n += 1.0;
+        }
+        if n == 0.0 || all <= 0.0 {
+            return (0.0, false);
+        }
+        // Of noise alone a cell's share is Beta(1, FINE - 1): mean 1 / FINE.
+        let mean = 1.0 / FINE;
+        let std = ((FINE - 1.0) / (FINE * FINE * (FINE + 1.0))).sqrt();
+        let likely = (mean + 5.0 * std / n.sqrt()).min(0.7);
+        (explained / all, shares / n > likely && explained / all > likely)
+    }
+}
+
+/// sum of variances from blocks of bins, with its degrees of freedom (Satterthwaite 1946).
+#[derive(Debug, Clone, Copy, Default)]
+struct Variance {
+    value: f64,
+    /// sum (share)^2 / pieces
+    uncertainty: f64,
+}
+
+impl Variance {
+    fn add(&mut self, weight: f64, density: f64, pieces: f64) {
+        self.value += weight * density;
+        self.uncertainty += (weight * density) * (weight * density) / pieces;
+    }
+
+    fn reach(&self) -> f64 {
+        let freedom = 2.0 * self.value * self.value / self.uncertainty;
+        if freedom.is_finite() { student_t_975(freedom.max(1.0)) * self.value.sqrt() } else { self.value.sqrt() }
+    }
+}
+
+impl Sink for Spread<'_> {
+    #[inline(always)]
+    fn take<const W: usize>(&mut self, bins: &Bins<W>) {
+        let at = bins.first - self.first;
+        let mut whitening = [self.whitening[0]; W];
+        let mut squared = [1.0; W];
+        for i in 0..W {
+            // cos(l omega) by the recurrence of Chebyshev's polynomials.
+            let c = self.cosines[at + i];
+            let (mut before, mut now) = (1.0, c);
+            for l in 1..=MAX_ORDER {
+                whitening[i] += 2.0 * self.whitening[l] * now;
+                (before, now) = (now, 2.0 * c * now - before);
+            }
+            if let Some(correction) = self.correction {
+                squared[i] = correction[at + i] * correction[at + i];
+            }
+        }
+        let mut sum = Cell::default();
+        if self.residual {
+            for i in 0..W {
+                let (yr, yi) = (bins.target_re[i], bins.target_im[i]);
+                let (er, ei) = (bins.measured_re[i], bins.measured_im[i]);
+                let energy = (er * er + ei * ei) * squared[i];
+                sum.residual += energy;
+                sum.whitened += energy * whitening[i];
+                sum.cross_re += (er * yr + ei * yi) * squared[i];
+                sum.cross_im += (ei * yr - er * yi) * squared[i];
+            }
+        } else {
+            let Influence { gain, delay, leverage } = self.influence;
+            for i in 0..W {
+                let (yr, yi) = (bins.target_re[i], bins.target_im[i]);
+                let (vr, vi) = (bins.measured_re[i], bins.measured_im[i]);
+                let (yy, yv, vv) = (yr * yr + yi * yi, yr * vr + yi * vi, vr * vr + vi * vi);
+                let form = |a: f64, b: f64, c: f64| (a * yy + 2.0 * b * yv + c * vv) * squared[i];
+                let weight = self.noisy_target.map_or(1.0, |n| n.weights[at + i]);
+                let noise = weight * weight / whitening[i];
+                sum.n += 1.0;
+                sum.gain += noise * form(gain[0] * gain[0], gain[0] * gain[1], gain[1] * gain[1]);
+                sum.delay += noise * form(delay[0] * delay[0], delay[0] * delay[1], delay[1] * delay[1]);
+                sum.leverage += weight * form(leverage[0], leverage[1], leverage[2]);
+                // What is not in the fit, for it is mostly noise, is not asked whether the residual follows it.
+                sum.target += if weight > 0.0 { yy * squared[i] } else { 0.0 };
+            }
+        }
+        let cell = &mut self.cells[at / self.width];
+        cell.n += sum.n;
+        cell.gain += sum.gain;
+        cell.delay += sum.delay;
+        cell.leverage += sum.leverage;
+        cell.target += sum.target;
+        cell.whitened += sum.whitened;
+        cell.residual += sum.residual;
+        cell.cross_re += sum.cross_re;
+        cell.cross_im += sum.cross_im;
+    }
+}

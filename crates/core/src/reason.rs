@@ -1,0 +1,104 @@
+//! Why a number or its interval is not there: data, not an error.
+
+use std::fmt;
+
+/// Why gain and delay could not be determined, or no interval is given with them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum Reason {
+    /// The target moves too little in the window, or one signal not at all.
+    Still,
+    /// Too few samples are left for which the shifted target is known.
+    TooShort {
+        /// How many are left.
+        n_samples: usize,
+    },
+    /// The target goes through too little of a cycle.
+    FewCycles {
+        /// Cycles in the window, a straight line taken out.
+        found: f64,
+    },
+    /// Too little of measured follows the target.
+    LowCoherence {
+        /// Share that follows.
+        goodness: f64,
+    },
+    /// Two delays fit equally well.
+    Ambiguous {
+        /// One of them, in seconds.
+        delay_s: f64,
+        /// The other.
+        other_s: f64,
+    },
+    /// The best delay lies outside what was searched.
+    BeyondMaxDelay {
+        /// The largest delay taken, in seconds.
+        max_delay_s: f64,
+    },
+    /// Measured moves against the target.
+    OppositeSign,
+    /// The iteration did not settle.
+    NoConvergence,
+    /// No interval: the residual follows the target, so that gain and delay are not one number each.
+    ResidualFollowsTarget {
+        /// Coherence of residual and target.
+        coherence: f64,
+    },
+    /// No interval: too few frequency bins to know the noise by.
+    FewBins,
+    /// No interval: it is known for weight power 2 only.
+    WeightPower,
+}
+
+impl Reason {
+    /// Whether there is no number either.
+    pub fn is_undetermined(&self) -> bool {
+        !matches!(self, Reason::ResidualFollowsTarget { .. } | Reason::FewBins | Reason::WeightPower)
+    }
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Reason::Still => write!(f, "not determined: too little motion to judge by"),
+            Reason::TooShort { n_samples } => write!(
+                f,
+                "not determined: only {n_samples} samples are left for which the shifted target is known; \
+                 lower max_delay_s or take a longer window"
+            ),
+            Reason::FewCycles { found } => write!(
+                f,
+                "not determined: target goes through {found:.2} of a cycle, at least 0.5 is needed; take a longer window"
+            ),
+            Reason::LowCoherence { goodness } if goodness.is_nan() => {
+                write!(f, "not determined: measured does not move")
+            }
+            Reason::LowCoherence { goodness } => write!(
+                f,
+                "not determined: only {:.0} % of measured follows target; is this the right pair?",
+                100.0 * goodness.max(0.0)
+            ),
+            Reason::Ambiguous { delay_s, other_s } => write!(
+                f,
+                "not determined: ambiguous, delays of {:.4} and {:.4} ms fit equally well; lower max_delay_s below half \
+                 their distance to choose the one near zero",
+                1e3 * delay_s,
+                1e3 * other_s
+            ),
+            Reason::BeyondMaxDelay { max_delay_s } => {
+                write!(f, "not determined: the best delay lies beyond max_delay_s = {max_delay_s} s; raise it")
+            }
+            Reason::OppositeSign => {
+                write!(f, "not determined: measured moves against target; does one of them have the opposite sign?")
+            }
+            Reason::NoConvergence => write!(f, "not determined: the iteration did not settle on a delay"),
+            Reason::ResidualFollowsTarget { coherence } => write!(
+                f,
+                "no interval: what one gain and one delay leave still follows target (coherence {coherence:.2}), so they \
+                 are not constant over frequency or time"
+            ),
+            Reason::FewBins => write!(f, "no interval: too few frequency bins to know the noise by"),
+            Reason::WeightPower => write!(f, "no interval: it is known for weight power 2 only"),
+        }
+    }
+}
