@@ -11,8 +11,10 @@
 //! 4. `spectrum`: Q by folding, the transform, the kept bins.
 //! 5. [`tracking`]: Eqs 6-12, amplitude and delay; [`Evaluator`] is the plan, [`EvaluatorState`] its buffers.
 //! 6. [`moving`]: the same over moving windows.
-//! 7. [`response`]: gain, phase, delay and coherence over frequency.
-//! 8. [`mod@indices`]: the time-domain indices in use beside them.
+//! 7. [`factors`]: the largest P and Q that a tolerance allows.
+//! 8. [`key_frequencies`]: the few bins that hold most of the weight, evaluated alone.
+//! 9. [`response`]: gain, phase, delay and coherence over frequency.
+//! 10. [`mod@indices`]: the time-domain indices in use beside them.
 //!
 //! [`dynamics`] makes such signals: virtual tests of structures with actuators that lag. It and the evaluation do not know
 //! each other.
@@ -24,7 +26,9 @@
 pub mod decimate;
 pub mod dynamics;
 pub mod error;
+pub mod factors;
 pub mod indices;
+pub mod key_frequencies;
 pub mod moving;
 pub mod pair;
 pub mod response;
@@ -34,7 +38,9 @@ pub mod window;
 
 pub use decimate::Decimator;
 pub use error::{Error, Result, Signal};
+pub use factors::{DelayMeasure, FactorChange, Factors, FactorsConfig, PriorBounds, choose_factors, prior_bounds};
 pub use indices::{IndexHistories, Indices, index_histories, indices};
+pub use key_frequencies::{KeyFrequencies, KeyFrequenciesConfig, KeyFrequenciesState};
 pub use moving::{MovingConfig, MovingTracking, evaluate_moving};
 pub use pair::Pair;
 pub use response::{FrequencyResponse, ResponseConfig, frequency_response};
