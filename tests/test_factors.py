@@ -1,7 +1,8 @@
-"""P and Q chosen by the program, and key frequencies: against sums over numpy.fft, in Python and on the command line."""
+"""P and Q chosen by the program, and key frequencies, against sums over numpy.fft; in Python and as commands."""
 
 from __future__ import annotations
 
+import csv
 import json
 from dataclasses import FrozenInstanceError
 from pathlib import Path
@@ -14,6 +15,7 @@ from rthstrack import assess, choose_factors, evaluate, evaluate_moving, key_fre
 from rthstrack.cli import main
 from rthstrack.errors import SettingError, SignalError
 from rthstrack.factors import prior_bounds
+from rthstrack.studies import Pair, Study, study
 from tolerances import physical, round_off
 
 RATE = 200.0
@@ -241,9 +243,9 @@ def recorded(tmp_path: Path) -> Path:
     return path
 
 
-def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+def run(capsys: pytest.CaptureFixture[str], *arguments: object, command: str = "evaluate") -> tuple[int, str, str]:
     try:
-        status = main(["evaluate", *map(str, arguments)])
+        status = main([command, *map(str, arguments)])
     except SystemExit as stop:
         status = int(stop.code or 0)
     out, err = capsys.readouterr()
@@ -314,5 +316,108 @@ def test_bad_values_are_misuse(
     capsys: pytest.CaptureFixture[str], recorded: Path, arguments: list[str], words: str
 ) -> None:
     status, out, err = run(capsys, recorded, *arguments)
+    assert (status, out) == (2, "")
+    assert words in err.splitlines()[-1]
+
+
+# --- study ----------------------------------------------------------------------------------------------------------
+
+
+def studied(**asked: Any) -> Study:
+    pairs = [Pair(*response(delay_s), RATE, name) for name, delay_s in (("late", 0.012), ("early", -0.02))]
+    return study(pairs, P=[1, 2], Q=[1, 2], windows=["boxcar", "hann"], timing=False, **asked)
+
+
+def test_a_study_holds_the_chosen_factors_and_key_frequencies_beside_its_grid() -> None:
+    found = studied(choose=("P", "Q"), tolerance=0.02, shares=(0.9, 0.999))
+    assert [c.kind for c in found.cells] == 4 * (["grid"] * 4 + ["chosen", "key", "key"])
+    assert [c.kind for c in found.select(source="late")] == ["grid"] * 8
+    assert found.cell(source="late", window="hann", P=2).kind == "grid"
+    target, measured = response(-0.02)
+    reference = evaluate(target, measured, RATE, window="hann")
+    (chosen,) = found.select(source="early", window="hann", kind="chosen")
+    factors = choose_factors(target, measured, RATE, tolerance=0.02, window="hann")
+    assert chosen.settings == factors.settings
+    assert (chosen.amplitude_bound, chosen.delay_bound) == (factors.amplitude_bound, factors.delay_bound)
+    assert (chosen.delay_measure, chosen.tolerance) == ("relative", 0.02)
+    assert abs(chosen.delay_change) <= chosen.delay_bound
+    few, many = found.select(source="early", window="hann", kind="key")
+    key = key_frequencies(target, RATE, 0.999, window="hann").evaluate(target, measured)
+    assert (few.share, many.share, many.n_bins, many.delay_s) == (0.9, 0.999, key.n_bins, key.delay_s)
+    assert few.n_bins < many.n_bins
+    assert many.delay_change == pytest.approx(float(key.delay_s) / float(reference.delay_s) - 1)
+    assert {row["kind"] for row in found.rows()} == {"grid", "chosen", "key"}
+    (alone,) = studied(choose="P").select(source="late", window="boxcar", kind="chosen")
+    assert alone.settings.frequency_decimation == 1 < alone.settings.data_decimation
+
+
+def test_cells_beside_the_grid_are_timed_too() -> None:
+    pair = Pair(*response(0.012), RATE, "late")
+    steps: list[tuple[int, int]] = []
+    found = study(pair, P=[1], Q=[1], windows="boxcar", choose=("P", "Q"), shares=(0.9,),
+                  progress=lambda done, total: steps.append((done, total)))  # fmt: skip
+    assert all(cell.computing_time_s > 0 for cell in found.cells)
+    assert steps == [(i, 6) for i in range(1, 7)]
+
+
+def test_what_cannot_be_chosen_is_a_cell_with_a_reason() -> None:
+    found = studied(choose=("P", "Q"), shares=(0.9,), band_hz=(0.001, 0.002))
+    assert all(cell.reason.startswith("no frequency bin is left") for cell in found.cells)
+    assert {cell.kind for cell in found.cells} == {"grid", "chosen", "key"}
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"choose": "R"}, "choose takes P and Q, found 'R'"),
+        ({"tolerance": 1}, "tolerance must be a number between 0 and 1"),
+        ({"shares": [0]}, "share must be above 0 and at most 1, not 0"),
+        ({"shares": [0.9, 0.9]}, "shares hold 0.9 twice"),
+        ({"shares": [0.9], "decimator": "chebyshev"}, "for the spectral decimator only, not chebyshev"),
+    ],
+)
+def test_a_study_refuses_nonsense(asked: dict[str, Any], words: str) -> None:
+    with pytest.raises(SettingError, match=words):
+        studied(**asked)
+
+
+def test_the_study_command_adds_them_to_its_tables(
+    capsys: pytest.CaptureFixture[str], recorded: Path, tmp_path: Path
+) -> None:
+    asked = ["-P", "1,4,auto", "-Q", "auto", "--tolerance", "0.02", "--share", "0.9,0.99", "--windows", "boxcar"]
+    status, out, _ = run(capsys, recorded, *asked, "-o", tmp_path, "--no-figures", command="study")
+    assert status == 0
+    found = choose_factors(*np.loadtxt(recorded, delimiter=",", skiprows=1, unpack=True)[1:], RATE, tolerance=0.02)
+    (line,) = [line for line in out.splitlines() if "chosen: changes A by at most" in line]
+    assert line.split()[:2] == [str(found.data_decimation), str(found.frequency_decimation)]
+    assert sum("key frequencies hold" in line for line in out.splitlines()) == 2
+    with open(tmp_path / "study.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["kind"] for row in rows[-3:]] == ["chosen", "key", "key"]
+    assert float(rows[-3]["delay_bound"]) == found.delay_bound
+    assert {row["data_decimation"] for row in rows[:-3]} == {"1", "4"}
+    assert len({row["frequency_decimation"] for row in rows[:-3]}) == 10, "auto alone keeps the default grid"
+    other = tmp_path / "other.csv"
+    other.write_bytes(recorded.read_bytes())
+    status, out, _ = run(capsys, recorded, other, *asked, "--no-timing", command="study")
+    assert sum("chosen: changes A by at most" in line for line in out.splitlines()) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--tolerance", "0.01"], "--tolerance speaks of P and Q that are chosen"),
+        (["-P", "auto", "--tolerance", "2"], "expected a number between 0 and 1, found '2'"),
+        (["--share", "0.9,much"], "share must be a number, not 'much'"),
+        (["--share", "2"], "share must be above 0 and at most 1, not 2"),
+        (["--share", ""], "share is empty: give at least one value"),
+        (["-Q", "2,automatic"], "Q must hold powers of two (1, 2, 4, ...), found 'automatic'"),
+        (["-P", "auto", "--decimator", "chebyshev"], "for the spectral decimator only, not chebyshev"),
+    ],
+)
+def test_the_study_command_refuses_nonsense(
+    capsys: pytest.CaptureFixture[str], recorded: Path, arguments: list[str], words: str
+) -> None:
+    status, out, err = run(capsys, recorded, *arguments, command="study")
     assert (status, out) == (2, "")
     assert words in err.splitlines()[-1]
