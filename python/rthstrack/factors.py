@@ -161,12 +161,15 @@ class KeyFrequencies(_Result):
     """The fewest frequency bins that hold a share of a target's weight, ready to evaluate pairs at them alone.
 
     `frequency_hz` (n_bins,) ascending; `share` was asked for, `share_held` is what they hold; `delta_f_hz` is the
-    spacing of the bins they were chosen among. Immutable, usable from many threads.
+    spacing of the bins they were chosen among. `direct`: each bin is a sum over the samples by itself; where they are
+    too many for that to be the cheaper way, all that lies below the highest is transformed and the others are dropped.
+    Immutable, usable from many threads.
     """
 
     frequency_hz: NDArray[np.float64]
     share: float
     share_held: float
+    direct: bool
     delta_f_hz: float
     rate_hz: float
     n_samples: int
@@ -176,8 +179,7 @@ class KeyFrequencies(_Result):
     def evaluate(self, target: ArrayLike, measured: ArrayLike) -> Tracking:
         """Amplitude and delay over these bins alone: Eqs 6-12 with all other weights at zero.
 
-        target, measured: (n_samples,), as many as the bins were chosen from. Only these bins are computed, each as a
-        sum over the samples, without a whole transform. Raises SignalError.
+        target, measured: (n_samples,), as many as the bins were chosen from. Raises SignalError.
         """
         t, m = _single(target, measured)
         if len(t) != self.n_samples:
@@ -199,7 +201,7 @@ def key_frequencies(target: ArrayLike, rate_hz: float, share: float = SHARE, **s
 
     target: (n_samples,), a whole record or a first window; pairs of the same length are then evaluated at these bins
     alone. share: above 0, at most 1. settings: those of `evaluate`; the decimator must be "spectral".
-    Few bins cost less than the transform, many cost more: docs/accuracy.md has the figures.
+    What they cost beside a plain evaluation is in docs/accuracy.md.
 
     Raises SignalError, SettingError.
 
@@ -216,7 +218,9 @@ def key_frequencies(target: ArrayLike, rate_hz: float, share: float = SHARE, **s
     checked = _settings(settings, factors=True)
     rate, wanted = _number("rate_hz", rate_hz), _number("share", share)
     plan = _core.KeyFrequencies(t, rate, wanted, checked)
-    return KeyFrequencies(plan.frequency_hz, wanted, plan.share_held, plan.delta_f_hz, rate, len(t), checked, plan)
+    return KeyFrequencies(
+        plan.frequency_hz, wanted, plan.share_held, plan.direct, plan.delta_f_hz, rate, len(t), checked, plan
+    )
 
 
 def _settings(settings: dict[str, Any], *, factors: bool = False) -> Settings:

@@ -1,9 +1,10 @@
 //! Key frequencies: the fewest bins that together hold a share of the weight, evaluated alone.
 //!
 //! They are chosen from a target once, by its full transform; after that only they are computed, of this target or of other
-//! windows of the same length. A bin costs a sum over all samples, so a few bins are cheaper than a transform and many are
-//! not. What lies above the highest of them is taken away first: the samples pass through the cascade of [`crate::decimate`]
-//! with the largest P that keeps that bin, exactly as P does, and the sums run over what is left.
+//! windows of the same length. What lies above the highest of them is taken away first: the samples pass through the cascade
+//! of [`crate::decimate`] with the largest P that keeps that bin, exactly as P does. Each bin is then a sum over the m samples
+//! that are left. Beyond some 2 log2 m bins a transform of these m samples costs less than the sums: there it is done, and
+//! the other bins are dropped.
 //!
 //! # The sums
 //! Eight bins at a time. With B = 64 samples a block and w = exp(-2 pi j k / m) for m samples,
@@ -19,7 +20,7 @@
 use std::f64::consts::PI;
 
 use num_complex::Complex;
-use pulp::{Arch, NullaryFnOnce};
+use pulp::{Arch, Simd, WithSimd};
 
 use crate::decimate::Decimator;
 use crate::error::{Error, Result};
@@ -30,6 +31,8 @@ use crate::tracking::{Evaluator, EvaluatorConfig, EvaluatorState, Sums, Term, Tr
 const GROUP: usize = 8;
 /// Samples a block.
 const BLOCK: usize = 64;
+/// Bins over log2 m at which the transform of m samples costs as much as the sums (measured: 1.6 to 2.0).
+const BINS_PER_OCTAVE: usize = 2;
 
 /// The user's numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,7 +58,8 @@ pub struct KeyFrequencies {
     /// What makes good the droop of the cascade at each of them.
     corrections: Vec<f64>,
     evaluator: Evaluator,
-    direct: Direct,
+    /// The sums; `None` where `evaluator` transforms and drops the other bins.
+    direct: Option<Direct>,
     arch: Arch,
 }
 
@@ -97,12 +101,12 @@ impl KeyFrequencies {
 
         let highest = bins[bins.len() - 1] * settings.frequency_decimation;
         let most = (whole.spectrum().fft_len() / 2 / highest.next_power_of_two()).max(settings.data_decimation);
-        let evaluator = Evaluator::new(target.len(), rate_hz, EvaluatorConfig { data_decimation: most, ..settings })?;
-        let spectrum = evaluator.spectrum();
-        let corrections = spectrum.correction();
-        let corrections = bins.iter().map(|b| corrections.as_ref().map_or(1.0, |c| c[b - spectrum.first()])).collect();
-        let (period, filled) = spectrum.sequence_len();
-        let direct = Direct::new(&bins, period, filled);
+        let mut evaluator =
+            Evaluator::new(target.len(), rate_hz, EvaluatorConfig { data_decimation: most, ..settings })?;
+        let corrections = evaluator.keep_only(&bins);
+        let (period, filled) = evaluator.spectrum().sequence_len();
+        let few = bins.len() <= BINS_PER_OCTAVE * period.ilog2() as usize;
+        let direct = few.then(|| Direct::new(&bins, period, filled));
         Ok(Self { config, share_held: held / total, bins, corrections, evaluator, direct, arch: Arch::new() })
     }
 
@@ -136,6 +140,11 @@ impl KeyFrequencies {
         self.bins.iter().map(|&b| b as f64 * self.delta_f_hz()).collect()
     }
 
+    /// Whether each bin is summed by itself: they are few enough for that to be the cheaper way.
+    pub fn is_direct(&self) -> bool {
+        self.direct.is_some()
+    }
+
     /// Buffers for [`KeyFrequencies::evaluate`].
     pub fn state(&self) -> KeyFrequenciesState {
         KeyFrequenciesState(self.evaluator.state())
@@ -146,6 +155,7 @@ impl KeyFrequencies {
     /// # Errors
     /// Those of [`Evaluator::evaluate`].
     pub fn evaluate(&self, state: &mut KeyFrequenciesState, pair: &Pair<'_>) -> Result<Tracking> {
+        let Some(direct) = &self.direct else { return self.evaluator.evaluate(&mut state.0, pair) };
         self.evaluator.check(pair)?;
         let spectrum = self.evaluator.spectrum();
         let state = &mut state.0.spectrum;
@@ -154,7 +164,7 @@ impl KeyFrequencies {
         let power = self.config.evaluator.weight_power;
         let mut sums = Sums::default();
         for (g, bins) in self.bins.chunks(GROUP).enumerate() {
-            let group = self.arch.dispatch(SumGroup { direct: &self.direct, group: g, signals });
+            let group = self.arch.dispatch(SumGroup { direct, group: g, signals });
             for (n, &k) in bins.iter().enumerate() {
                 let factor = self.corrections[g * GROUP + n];
                 let [ir, ii, or, oi] = [0, 1, 2, 3].map(|part| group[part][n] * factor);
@@ -200,27 +210,33 @@ impl Direct {
 
     /// Real and imaginary parts of target and measured at one group of bins.
     #[inline(always)]
-    fn sum(&self, group: usize, [target, measured]: [&[f64]; 2]) -> [[f64; GROUP]; 4] {
-        let zero = [0.0; GROUP];
-        let [turn_re, turn_im] = &self.turns[group];
+    fn sum<S: Simd>(&self, simd: S, group: usize, [target, measured]: [&[f64]; 2]) -> [[f64; GROUP]; 4] {
         let table = &self.twiddles[group * self.block * 2 * GROUP..][..self.block * 2 * GROUP];
-        let mut total = [zero; 4];
+        let [turn_re, turn_im] = &self.turns[group];
+        let width = GROUP / S::F64_LANES.min(GROUP);
+        let mut total = [[0.0; GROUP]; 4];
         for b in (0..self.n_blocks).rev() {
             let range = b * self.block..(b + 1) * self.block;
-            let (mut t_re, mut t_im, mut m_re, mut m_im) = (zero, zero, zero, zero);
-            for ((t, m), w) in target[range.clone()].iter().zip(&measured[range]).zip(table.chunks_exact(2 * GROUP)) {
-                for n in 0..GROUP {
-                    t_re[n] += t * w[n];
-                    t_im[n] += t * w[GROUP + n];
-                    m_re[n] += m * w[n];
-                    m_im[n] += m * w[GROUP + n];
+            let mut sums = [[simd.splat_f64s(0.0); GROUP]; 4];
+            for ((&t, &m), w) in target[range.clone()].iter().zip(&measured[range]).zip(table.chunks_exact(2 * GROUP)) {
+                let (t, m) = (simd.splat_f64s(t), simd.splat_f64s(m));
+                let (w, _) = S::as_simd_f64s(w);
+                for v in 0..width {
+                    sums[0][v] = simd.mul_add_e_f64s(t, w[v], sums[0][v]);
+                    sums[1][v] = simd.mul_add_e_f64s(t, w[width + v], sums[1][v]);
+                    sums[2][v] = simd.mul_add_e_f64s(m, w[v], sums[2][v]);
+                    sums[3][v] = simd.mul_add_e_f64s(m, w[width + v], sums[3][v]);
                 }
             }
-            for (at, re, im) in [(0, &t_re, &t_im), (2, &m_re, &m_im)] {
+            let mut block = [[0.0; GROUP]; 4];
+            for (lanes, sums) in block.iter_mut().zip(&sums) {
+                S::as_mut_simd_f64s(lanes).0.copy_from_slice(&sums[..width]);
+            }
+            for signal in [0, 2] {
                 for n in 0..GROUP {
-                    let (x, y) = (total[at][n], total[at + 1][n]);
-                    total[at][n] = x * turn_re[n] - y * turn_im[n] + re[n];
-                    total[at + 1][n] = x * turn_im[n] + y * turn_re[n] + im[n];
+                    let (x, y) = (total[signal][n], total[signal + 1][n]);
+                    total[signal][n] = x * turn_re[n] - y * turn_im[n] + block[signal][n];
+                    total[signal + 1][n] = x * turn_im[n] + y * turn_re[n] + block[signal + 1][n];
                 }
             }
         }
@@ -235,11 +251,11 @@ struct SumGroup<'a> {
     signals: [&'a [f64]; 2],
 }
 
-impl NullaryFnOnce for SumGroup<'_> {
+impl WithSimd for SumGroup<'_> {
     type Output = [[f64; GROUP]; 4];
 
     #[inline(always)]
-    fn call(self) -> Self::Output {
-        self.direct.sum(self.group, self.signals)
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        self.direct.sum(simd, self.group, self.signals)
     }
 }

@@ -249,6 +249,18 @@ impl Evaluator {
         Ok((tracking, spectra))
     }
 
+    /// From now on only `bins` count; returns what makes good the droop of the cascade at each of them.
+    pub(crate) fn keep_only(&mut self, bins: &[usize]) -> Vec<f64> {
+        let first = self.spectrum.first();
+        let factors: Vec<f64> = bins.iter().map(|b| self.correction.as_ref().map_or(1.0, |c| c[b - first])).collect();
+        let mut kept = vec![0.0; self.n_bins()];
+        for (b, factor) in bins.iter().zip(&factors) {
+            kept[b - first] = *factor;
+        }
+        self.correction = Some(kept);
+        factors
+    }
+
     /// Refuses a pair of another length or rate.
     pub(crate) fn check(&self, pair: &Pair<'_>) -> Result<()> {
         let found = (pair.n_samples(), pair.rate_hz());

@@ -46,9 +46,10 @@ fn evaluating_allocates_nothing() {
         evaluator.evaluate(&mut state, &pair).unwrap();
         assert_eq!(COUNT.with(Cell::get), before, "{config:?}");
     }
-    for data_decimation in [1, 4] {
-        let evaluator = EvaluatorConfig { data_decimation, ..Default::default() };
-        let key = KeyFrequencies::new(&target, 1000.0, KeyFrequenciesConfig { share: 0.99, evaluator }).unwrap();
+    for (share, direct) in [(0.9, true), (0.99999, false)] {
+        let evaluator = EvaluatorConfig::default();
+        let key = KeyFrequencies::new(&target, 1000.0, KeyFrequenciesConfig { share, evaluator }).unwrap();
+        assert_eq!(key.is_direct(), direct);
         let mut state = key.state();
         let before = COUNT.with(Cell::get);
         key.evaluate(&mut state, &pair).unwrap();

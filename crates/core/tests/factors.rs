@@ -195,6 +195,7 @@ fn bin(x: &[f64], k: usize) -> Complex<f64> {
 #[test]
 fn key_frequencies_are_the_fewest_that_hold_the_share_and_only_they_are_summed() {
     let plain = EvaluatorConfig::default();
+    let mut directly = Vec::new();
     for (n, share, config) in [
         (700, 0.99, plain),
         (5000, 0.9, plain),
@@ -235,7 +236,9 @@ fn key_frequencies_are_the_fewest_that_hold_the_share_and_only_they_are_summed()
         let fei = cross / power;
         assert!((found.fei - fei).norm() <= 1e-8 * fei.norm(), "{context}: {} {fei}", found.fei);
         assert!((found.equivalent_frequency_hz - moment / power).abs() <= 1e-8 * moment / power, "{context}");
+        directly.push(key.is_direct());
     }
+    assert!(directly.contains(&true) && directly.contains(&false), "both ways: {directly:?}");
 }
 
 #[test]

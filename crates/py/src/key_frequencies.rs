@@ -43,6 +43,11 @@ impl KeyFrequencies {
     }
 
     #[getter]
+    fn direct(&self) -> bool {
+        self.plan.is_direct()
+    }
+
+    #[getter]
     fn delta_f_hz(&self) -> f64 {
         self.plan.delta_f_hz()
     }
