@@ -257,6 +257,20 @@ fn with_all_bins_key_frequencies_give_the_evaluation() {
 }
 
 #[test]
+fn the_droop_of_the_cascade_is_made_good_at_single_bins() {
+    let n = 16384;
+    let tone = |k: usize, i: usize| (2.0 * PI * ((k * i) % n) as f64 / n as f64).sin();
+    let target: Vec<f64> = (0..n).map(|i| tone(40, i) + tone(500, i)).collect();
+    let measured: Vec<f64> = (0..n).map(|i| tone(40, i) + 2.0 * tone(500, i)).collect();
+    let key = KeyFrequencies::new(&target, RATE_HZ, KeyFrequenciesConfig::default()).unwrap();
+    assert!(key.is_direct() && key.frequency_hz().len() == 2);
+    let pair = Pair::new(&target, &measured, RATE_HZ).unwrap();
+    let found = key.evaluate(&mut key.state(), &pair).unwrap();
+    assert!((found.fei - Complex::new(1.5, 0.0)).norm() < 1e-9, "{}", found.fei);
+    assert!((found.equivalent_frequency_hz - 270.0 * RATE_HZ / n as f64).abs() < 1e-9);
+}
+
+#[test]
 fn key_frequencies_of_a_first_window_serve_the_next() {
     let (target, measured) = pair(4096, 0.012);
     let config = KeyFrequenciesConfig { share: 0.99, evaluator: EvaluatorConfig::default() };
