@@ -16,6 +16,7 @@ from rthstrack.errors import (
     SignalError,
     UnstableError,
 )
+from rthstrack.factors import FactorChanges, Factors, KeyFrequencies, choose_factors, key_frequencies
 from rthstrack.ground_motion import GroundMotion, list_records, read_ground_motion, record, synthetic_ground_motion
 from rthstrack.recording import Channel, Recording, propose_pair, read_recording
 from rthstrack.report import write_report
@@ -54,10 +55,13 @@ __all__ = [
     "CriticalDelay",
     "DelayDamping",
     "Evaluator",
+    "FactorChanges",
+    "Factors",
     "FrequencyResponse",
     "GroundMotion",
     "IndexHistories",
     "Indices",
+    "KeyFrequencies",
     "Limits",
     "MovingTracking",
     "Recording",
@@ -73,6 +77,7 @@ __all__ = [
     "VirtualTest",
     "__version__",
     "assess",
+    "choose_factors",
     "critical_delay",
     "delay_damping",
     "evaluate",
@@ -80,6 +85,7 @@ __all__ = [
     "frequency_response",
     "index_histories",
     "indices",
+    "key_frequencies",
     "list_records",
     "propose_pair",
     "read_configuration",

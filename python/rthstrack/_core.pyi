@@ -10,14 +10,17 @@ from rthstrack.tracking import Settings
 
 __all__ = [
     "Evaluator",
+    "KeyFrequencies",
     "VirtualTest",
     "__version__",
     "check_test",
+    "choose_factors",
     "evaluate_moving",
     "frequency_response",
     "from_matrices",
     "index_histories",
     "indices",
+    "prior_bounds",
     "read_text",
     "sdof",
     "shear_building",
@@ -46,6 +49,34 @@ class Evaluator:
     def evaluate_with_spectra(
         self, target: NDArray[Any], measured: NDArray[Any]
     ) -> list[tuple[_Numbers, _Spectra]]: ...
+
+_Whole = NDArray[np.uint64]
+_Changes = tuple[_Whole, _Whole, _Whole, _Array, _Array]
+
+@final
+class KeyFrequencies:
+    def __new__(cls, target: NDArray[Any], rate_hz: float, share: float, settings: Settings) -> KeyFrequencies: ...
+    @property
+    def frequency_hz(self) -> _Array: ...
+    @property
+    def share_held(self) -> float: ...
+    @property
+    def direct(self) -> bool: ...
+    @property
+    def delta_f_hz(self) -> float: ...
+    def evaluate(self, target: NDArray[Any], measured: NDArray[Any]) -> _Numbers: ...
+
+def choose_factors(
+    evaluator: Evaluator,
+    target: NDArray[Any],
+    measured: NDArray[Any],
+    tolerance: float,
+    data_decimation: int | None,
+    frequency_decimation: int | None,
+) -> tuple[int, int, float, float, bool, _Numbers, _Changes]: ...
+def prior_bounds(
+    evaluator: Evaluator, target: NDArray[Any], measured: NDArray[Any]
+) -> tuple[_Changes, _Changes, bool]: ...
 
 _Mistakes = list[tuple[str, str]]
 _Structure = tuple[tuple[_Array, _Array, _Array, _Array] | None, _Mistakes]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ import numpy as np
 from rthstrack import verdict as words
 from rthstrack.display import signal_roles
 from rthstrack.errors import SettingError, SignalError
+from rthstrack.factors import TOLERANCE, Factors, choose_factors
 from rthstrack.tracking import Evaluator, Settings, evaluate_moving, frequency_response, index_histories, indices
 
 if TYPE_CHECKING:
@@ -69,6 +70,7 @@ class Assessment:
     warnings: tuple[str, ...]
     limits: Limits
     exceeded: tuple[str, ...]
+    factors: Factors | None = None  # P and Q with their bound, where the program chose them
 
 
 def assess(
@@ -77,6 +79,8 @@ def assess(
     rate_hz: float,
     *,
     settings: Settings | None = None,
+    choose: Collection[str] = (),
+    tolerance: float = TOLERANCE,
     moving_s: float | None = None,
     hop_s: float | None = None,
     limits: Limits | None = None,
@@ -93,6 +97,8 @@ def assess(
     """Judges one pair in every way there is: whole record, moving windows, over frequency, indices, warnings.
 
     target, measured: (n_samples,) in `unit` (and `measured_unit`, the same unless given); settings: of `evaluate`.
+    choose: "P", "Q" or both are chosen within `tolerance` (`choose_factors`), in place of those in settings. They fit
+    the whole record only: moving windows have 1 in their place.
     moving_s, hop_s: moving windows; by default 4 s but at most a quarter of the record, sixteen readings a window.
     limits: apply to |delay| and |amplitude - 1|. `origin` says what was done to the samples before.
 
@@ -102,13 +108,16 @@ def assess(
     settings = settings or Settings()
     t = np.ascontiguousarray(target, dtype=np.float64)
     m = np.ascontiguousarray(measured, dtype=np.float64)
-    tracking = Evaluator(max(t.size, 1), rate_hz, settings).evaluate(t, m, weights=True)
+    factors = _chosen(t, m, rate_hz, settings, choose, tolerance) if choose else None
+    for_record = settings if factors is None else factors.settings
+    tracking = Evaluator(max(t.size, 1), rate_hz, for_record).evaluate(t, m, weights=True)
+    for_windows = tracking.settings if factors is None else factors.reference.settings
     asked = moving_s is not None or hop_s is not None
     window_s = min(MOVING_S, t.size / rate_hz / 4) if moving_s is None else moving_s
     hop_s = max(window_s / READINGS_PER_WINDOW, 1 / rate_hz) if hop_s is None else hop_s
     moving, moving_note = None, None
     try:
-        moving = evaluate_moving(t, m, rate_hz, window_s=window_s, hop_s=hop_s, **dataclasses.asdict(tracking.settings))
+        moving = evaluate_moving(t, m, rate_hz, window_s=window_s, hop_s=hop_s, **dataclasses.asdict(for_windows))
     except (SettingError, SignalError) as error:
         if asked:
             raise type(error)(f"moving windows of {window_s:g} s: {error}") from None
@@ -120,7 +129,7 @@ def assess(
         response_note = f"not determined: {error}"
     limits = limits or Limits()
     names = (target_name, measured_name)
-    evaluation = dataclasses.asdict(tracking.settings)
+    evaluation = dataclasses.asdict(tracking.settings) | _factor_settings(factors)
     return Assessment(
         file=file,
         actuator=actuator,
@@ -144,7 +153,49 @@ def assess(
         warnings=words.warnings(t, m, tracking, moving, response, (unit, measured_unit or unit), names),
         limits=limits,
         exceeded=words.exceeded(tracking, limits),
+        factors=factors,
     )
+
+
+def _chosen(
+    target: NDArray[np.float64],
+    measured: NDArray[np.float64],
+    rate_hz: float,
+    settings: Settings,
+    choose: Collection[str],
+    tolerance: float,
+) -> Factors:
+    if unknown := [name for name in choose if name not in ("P", "Q")]:
+        raise SettingError(f"choose takes P and Q, not {unknown[0]!r}")
+    given = dataclasses.asdict(settings)
+    p, q = given.pop("data_decimation"), given.pop("frequency_decimation")
+    return choose_factors(
+        target,
+        measured,
+        rate_hz,
+        tolerance=tolerance,
+        data_decimation=None if "P" in choose else p,
+        frequency_decimation=None if "Q" in choose else q,
+        **given,
+    )
+
+
+def _factor_settings(factors: Factors | None) -> dict[str, Any]:
+    """What was chosen and the bound it keeps to, for `Assessment.settings`; nothing where nothing was chosen."""
+    if factors is None:
+        return {}
+    reference = factors.reference.settings
+    return {
+        "chosen_factors": {
+            "tolerance": factors.tolerance,
+            "amplitude_bound": factors.amplitude_bound,
+            "delay_bound": factors.delay_bound,
+            "delay_measure": factors.delay_measure,
+            # moving windows are evaluated with these, too
+            "reference_data_decimation": reference.data_decimation,
+            "reference_frequency_decimation": reference.frequency_decimation,
+        }
+    }
 
 
 def result_entry(a: Assessment) -> dict[str, Any]:

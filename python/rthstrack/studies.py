@@ -1,5 +1,7 @@
 """What data decimation P and frequency decimation Q do to amplitude, delay and computing time, over grids of both.
 
+Beside the grid: P and Q chosen by the program, and key frequencies.
+
 The grids of the paper (sections 3 to 5) are the defaults. Signs and units as in `evaluate`: delay > 0 is a lag.
 """
 
@@ -22,6 +24,7 @@ import numpy as np
 from rthstrack.assessment import json_ready
 from rthstrack.configuration import read_configuration
 from rthstrack.errors import RecordingError, SettingError, SignalError
+from rthstrack.factors import TOLERANCE, choose_factors, key_frequencies
 from rthstrack.ground_motion import ground_motion_from
 from rthstrack.recording import propose_pair, read_recording
 from rthstrack.run_file import read_run_test
@@ -98,6 +101,9 @@ class Cell:
     that at the cell's own equivalent frequency; errors are value / truth - 1, and `delay_error_s` is delay less true
     delay. `highest_frequency_hz` is rate/(2P). `computing_time_s` is the fastest of several calls of a planned
     `Evaluator`, planning left out.
+
+    `kind` is "grid", "chosen" (P and Q of `choose_factors` within `tolerance`, with its bounds) or "key" (the bins that
+    `key_frequencies` takes to hold `share` of the weight, evaluated alone; choosing them is not in the time).
     """
 
     source: str
@@ -118,6 +124,12 @@ class Cell:
     delay_error_s: float = math.nan
     computing_time_s: float = math.nan
     reason: str = ""
+    kind: str = "grid"
+    tolerance: float = math.nan
+    amplitude_bound: float = math.nan
+    delay_bound: float = math.nan
+    delay_measure: str = ""
+    share: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,6 +146,9 @@ class StudySettings:
     detrend: str = "none"
     band_hz: tuple[float, float] | None = None
     timing: bool = True
+    choose: tuple[str, ...] = ()
+    tolerance: float = TOLERANCE
+    shares: tuple[float, ...] = ()
 
     def checked(self) -> StudySettings:
         """The same with the defaults filled in; raises SettingError for what is impossible whatever the source."""
@@ -143,6 +158,14 @@ class StudySettings:
         powers = tuple(_count("weight_power", power) for power in _several("weight_powers", self.weight_powers))
         base = Settings(self.estimator, decimator=self.decimator, detrend=self.detrend, band_hz=self.band_hz)._checked()
         _check_band(base.band_hz)
+        tolerance = _number("tolerance", self.tolerance)
+        if not 0 < tolerance < 1:
+            raise SettingError(f"tolerance must be a number between 0 and 1, both excluded, not {tolerance:g}")
+        choose, shares = _named_factors(self.choose), _shares(self.shares)
+        if (choose or shares) and base.decimator != "spectral":
+            raise SettingError(
+                f"P and Q are chosen, and key frequencies taken, for the spectral decimator only, not {base.decimator}"
+            )
         whole = StudySettings(
             _powers_of_two("P", POWERS if self.P is None else self.P),
             _powers_of_two("Q", POWERS if self.Q is None else self.Q),
@@ -154,6 +177,9 @@ class StudySettings:
             base.detrend,
             base.band_hz,
             bool(self.timing),
+            choose,
+            tolerance,
+            shares,
         )
         for kind in whole._kinds():
             Evaluator(1024, 1.0, dataclasses.replace(kind, band_hz=None))
@@ -179,7 +205,10 @@ class StudySettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Study(_Result):
-    """The cells of a study, by source, window, weight power, P and Q in this order, and what was asked for."""
+    """The cells of a study, by source, window, weight power, P and Q in this order, and what was asked for.
+
+    After each grid come the factors that were chosen and the key frequencies, where these were asked for.
+    """
 
     sources: tuple[StudiedSource, ...]
     settings: StudySettings
@@ -193,13 +222,18 @@ class Study(_Result):
         weight_power: int | None = None,
         P: int | None = None,
         Q: int | None = None,
+        kind: str | None = "grid",
     ) -> tuple[Cell, ...]:
-        """The cells with these settings, in the study's order; None takes all."""
+        """The cells with these settings, in the study's order; None takes all.
+
+        kind: "grid", "chosen" (P and Q chosen by the program) or "key" (key frequencies).
+        """
         wanted = (source, window, weight_power, P, Q)
         return tuple(
             cell
             for cell in self.cells
-            if all(w is None or w == found for w, found in zip(wanted, _key(cell.source, cell.settings), strict=True))
+            if kind in (None, cell.kind)
+            and all(w is None or w == found for w, found in zip(wanted, _key(cell.source, cell.settings), strict=True))
         )
 
     def cell(
@@ -211,7 +245,7 @@ class Study(_Result):
         weight_power: int | None = None,
         source: str | None = None,
     ) -> Cell:
-        """The one cell with these settings; source, window and weight power may be left out where there is one only.
+        """The one cell of the grid with these settings; source, window, weight power may be left out if there is one.
 
         Raises SettingError where there is none, or more than one.
         """
@@ -271,6 +305,9 @@ def study(
     band_hz: tuple[float, float] | None = None,
     truth: Truth | None = None,
     timing: bool = True,
+    choose: Iterable[str] = (),
+    tolerance: float = TOLERANCE,
+    shares: Iterable[float] = (),
     progress: Callable[[int, int], object] | None = None,
 ) -> Study:
     """Amplitude, delay, their change and error, and computing time over grids of P and Q, windows and weight powers.
@@ -280,6 +317,8 @@ def study(
     P, Q: powers of two; every P with every Q, but both above 1 only up to `combined` (P, Q). With neither given: the
     paper's, each alone from 1 to 512 and combined up to (64, 32). combined: None for all where P or Q are given.
     truth: as in `Pair`, in place of what the sources say themselves (a `Run` knows its own).
+    choose: "P", "Q" or both: also the largest factors within `tolerance` (`choose_factors`); one alone: the other at 1.
+    shares: also the key frequencies that hold these shares of the weight, by `key_frequencies`.
     Other settings as in `evaluate`.
     timing: also time every cell, one after another when all numbers are there. progress: called with (done, total).
 
@@ -296,25 +335,49 @@ def study(
         detrend,
         band_hz,
         timing,
+        choose,  # type: ignore[arg-type]
+        tolerance,
+        shares,  # type: ignore[arg-type]
     ).checked()
     pairs = _pairs(sources, truth)
     grid, kinds = settings._grid(), settings._kinds()
-    asked = [(pair, kind, _at(kind, p, q)) for pair in pairs for kind in kinds for p, q in grid]
+    extras = [("chosen", math.nan)] * bool(settings.choose) + [("key", share) for share in settings.shares]
     # The changes need P = Q = 1 where the grid lacks it. Pairs of one length share a plan: they follow each other.
     each = dict.fromkeys(one for kind in kinds for one in (kind, *(_at(kind, p, q) for p, q in grid)))
     wanted = {_key(pair.name, one): (pair, one) for one in each for pair in pairs}
-    steps = _Steps(progress, len(wanted) + timing * len(asked))
+    beside = [(pair, kind, *extra) for kind in kinds for extra in extras for pair in pairs]
+    n_cells = len(pairs) * len(kinds) * (len(grid) + len(extras))
+    steps = _Steps(progress, len(wanted) + len(beside) + timing * n_cells)
     with ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
         found = {}
         for key, result in zip(wanted, pool.map(lambda one: _evaluated(*one), wanted.values()), strict=True):
             found[key] = result
             steps.done()
-    cells = [_cell(pair, at, found[_key(pair.name, at)], found[_key(pair.name, kind)]) for pair, kind, at in asked]
+
+        def cell_beside(pair: Pair, kind: Settings, what: str, share: float) -> Cell:
+            reference = found[_key(pair.name, kind)]
+            if what == "key":
+                return _key_cell(pair, kind, share, reference)
+            return _chosen_cell(pair, kind, settings.choose, settings.tolerance, reference)
+
+        others = {}
+        for one, cell in zip(beside, pool.map(lambda one: cell_beside(*one), beside), strict=True):
+            others[one[0].name, *one[1:]] = cell
+            steps.done()
+    cells = []
+    for pair in pairs:
+        for kind in kinds:
+            reference = found[_key(pair.name, kind)]
+            for at in (_at(kind, p, q) for p, q in grid):
+                cells.append(_cell(pair, at, found[_key(pair.name, at)], reference))
+            cells += [others[pair.name, kind, *extra] for extra in extras]
     if timing:
-        for i in sorted(range(len(asked)), key=lambda i: i % (len(asked) // len(pairs))):
-            pair, _, at = asked[i]
+        per_pair = n_cells // len(pairs)
+        for i in sorted(range(n_cells), key=lambda i: i % per_pair):
             if not cells[i].reason:
-                cells[i] = dataclasses.replace(cells[i], computing_time_s=_computing_time_s(pair, at))
+                cells[i] = dataclasses.replace(
+                    cells[i], computing_time_s=_computing_time_s(pairs[i // per_pair], cells[i])
+                )
             steps.done()
     studied = (StudiedSource(p.name, p.target_name, p.measured_name, p.rate_hz, p.target.size, p.notes) for p in pairs)
     return Study(tuple(studied), settings, tuple(cells))
@@ -507,6 +570,45 @@ def _cell(pair: Pair, settings: Settings, found: Tracking | str, reference: Trac
     )
 
 
+def _chosen_cell(
+    pair: Pair, kind: Settings, choose: tuple[str, ...], tolerance: float, reference: Tracking | str
+) -> Cell:
+    """The cell of the factors that `choose_factors` takes, with its bounds."""
+    rest = _without_factors(kind)
+    given: dict[str, Any] = {
+        "data_decimation": None if "P" in choose else 1,
+        "frequency_decimation": None if "Q" in choose else 1,
+    }
+    try:
+        factors = choose_factors(pair.target, pair.measured, pair.rate_hz, tolerance=tolerance, **given, **rest)
+    except (SettingError, SignalError) as error:
+        return dataclasses.replace(_cell(pair, kind, str(error), reference), kind="chosen", tolerance=tolerance)
+    return dataclasses.replace(
+        _cell(pair, factors.settings, _evaluated(pair, factors.settings), reference),
+        kind="chosen",
+        tolerance=tolerance,
+        amplitude_bound=factors.amplitude_bound,
+        delay_bound=factors.delay_bound,
+        delay_measure=factors.delay_measure,
+    )
+
+
+def _key_cell(pair: Pair, kind: Settings, share: float, reference: Tracking | str) -> Cell:
+    """The cell of the key frequencies of this pair's own target."""
+    try:
+        key = key_frequencies(pair.target, pair.rate_hz, share, **_without_factors(kind))
+        cell = _cell(pair, kind, key.evaluate(pair.target, pair.measured), reference)
+    except (SettingError, SignalError) as error:
+        return dataclasses.replace(_cell(pair, kind, str(error), reference), kind="key", share=share)
+    return dataclasses.replace(cell, kind="key", share=share, highest_frequency_hz=float(key.frequency_hz[-1]))
+
+
+def _without_factors(settings: Settings) -> dict[str, Any]:
+    rest = dataclasses.asdict(settings)
+    del rest["data_decimation"], rest["frequency_decimation"]
+    return rest
+
+
 def _at(kind: Settings, p: int, q: int) -> Settings:
     return dataclasses.replace(kind, data_decimation=p, frequency_decimation=q)
 
@@ -515,13 +617,16 @@ def _relative(value: float, reference: float) -> float:
     return value / reference - 1 if reference else math.nan
 
 
-def _computing_time_s(pair: Pair, settings: Settings) -> float:
+def _computing_time_s(pair: Pair, cell: Cell) -> float:
     """The fastest of several calls: whatever else the machine does can only slow a call down."""
-    evaluator = Evaluator(pair.target.size, pair.rate_hz, settings)
+    if cell.kind == "key":
+        plan: Any = key_frequencies(pair.target, pair.rate_hz, cell.share, **_without_factors(cell.settings))
+    else:
+        plan = Evaluator(pair.target.size, pair.rate_hz, cell.settings)
     best, spent, calls = math.inf, 0.0, 0
     while calls < _LEAST_CALLS or (calls < _MOST_CALLS and spent < _ENOUGH_S):
         start = time.perf_counter()
-        evaluator.evaluate(pair.target, pair.measured)
+        plan.evaluate(pair.target, pair.measured)
         seconds = time.perf_counter() - start
         best, spent, calls = min(best, seconds), spent + seconds, calls + 1
     return best
@@ -581,6 +686,24 @@ def _combined(limits: Any) -> tuple[int, int] | None:
             f"combined must be the largest P and Q taken together, two numbers, not {limits!r}"
         ) from None
     return _count("combined P", most_p), _count("combined Q", most_q)
+
+
+def _named_factors(choose: Any) -> tuple[str, ...]:
+    names = tuple(choose)
+    for name in names:
+        if name not in ("P", "Q"):
+            raise SettingError(f"choose takes P and Q, found {name!r}")
+    return tuple(sorted(set(names)))
+
+
+def _shares(shares: Any) -> tuple[float, ...]:
+    numbers = tuple(_number("share", share) for share in shares)
+    for share in numbers:
+        if not 0 < share <= 1:
+            raise SettingError(f"share must be above 0 and at most 1, not {share:g}")
+        if numbers.count(share) > 1:
+            raise SettingError(f"shares hold {share:g} twice: give every value once")
+    return numbers
 
 
 def _check_band(band_hz: tuple[float, float] | None) -> None:

@@ -136,6 +136,10 @@ pub enum Error {
         /// Samples given.
         found: usize,
     },
+    /// P and Q are to be chosen for the Chebyshev decimator.
+    FactorsNeedSpectral,
+    /// Single bins are asked of the Chebyshev decimator.
+    KeyFrequenciesNeedSpectral,
     /// A plan was used on a pair of another length or rate.
     Plan {
         /// Length and rate of the plan.
@@ -216,6 +220,14 @@ impl fmt::Display for Error {
                 f,
                 "{found} samples are too few for the chebyshev decimator: at least {expected} are needed; use the spectral one"
             ),
+            Error::FactorsNeedSpectral => write!(
+                f,
+                "P and Q are chosen for the spectral decimator only, whose bins are those of the full transform: choose that \
+                 decimator, or give P and Q"
+            ),
+            Error::KeyFrequenciesNeedSpectral => {
+                write!(f, "key frequencies are bins of the full transform: choose the spectral decimator")
+            }
             Error::Plan { expected, found } => write!(
                 f,
                 "this evaluator is planned for {} samples at {} Hz, not for {} at {} Hz",

@@ -13,8 +13,10 @@
 //! 6. `alignment`: the estimators that shift the target before it is windowed; `lag` finds where to start, `lagrange` reads
 //!    between samples, `noise` gives the intervals, [`reason`] says why there is none.
 //! 7. [`moving`]: the same over moving windows.
-//! 8. [`response`]: gain, phase, delay and coherence over frequency.
-//! 9. [`mod@indices`]: the time-domain indices in use beside them.
+//! 8. [`factors`]: the largest P and Q that a tolerance allows.
+//! 9. [`key_frequencies`]: the few bins that hold most of the weight, evaluated alone.
+//! 10. [`response`]: gain, phase, delay and coherence over frequency.
+//! 11. [`mod@indices`]: the time-domain indices in use beside them.
 //!
 //! [`dynamics`] makes such signals: virtual tests of structures with actuators that lag. It and the evaluation do not know
 //! each other.
@@ -27,7 +29,9 @@ mod alignment;
 pub mod decimate;
 pub mod dynamics;
 pub mod error;
+pub mod factors;
 pub mod indices;
+pub mod key_frequencies;
 mod lag;
 mod lagrange;
 pub mod moving;
@@ -42,7 +46,9 @@ pub mod window;
 
 pub use decimate::Decimator;
 pub use error::{Error, Result, Signal};
+pub use factors::{DelayMeasure, FactorChange, Factors, FactorsConfig, PriorBounds, choose_factors, prior_bounds};
 pub use indices::{IndexHistories, Indices, index_histories, indices};
+pub use key_frequencies::{KeyFrequencies, KeyFrequenciesConfig, KeyFrequenciesState};
 pub use moving::{MovingConfig, MovingTracking, evaluate_moving};
 pub use pair::Pair;
 pub use reason::Reason;

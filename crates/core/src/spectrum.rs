@@ -209,6 +209,21 @@ impl Spectrum {
         self.fft.process_with_scratch(bins, transform);
     }
 
+    /// Prepares both signals as [`Spectrum::transform`] does, and stops before the transform.
+    pub(crate) fn shorten_both(&self, state: &mut SpectrumState, target: &[f64], measured: &[f64]) {
+        let SpectrumState { target: first, measured: second, scratch: Scratch { transform, passes } } = state;
+        for (samples, out) in [(target, first), (measured, second)] {
+            let out = bytemuck::cast_slice_mut(out);
+            self.arch.dispatch(Shorten { plan: self, samples, stream: None, out, scratch: transform, passes });
+        }
+    }
+
+    /// Length of the sequence that is transformed, and how much of it may differ from zero.
+    pub(crate) fn sequence_len(&self) -> (usize, usize) {
+        let len = self.cascade.out_len();
+        (len, if self.cascade.is_empty() { len.min(self.config.n_samples) } else { len })
+    }
+
     /// What windows that start at multiples of `hop` share: the cascade's first pass, where nothing is done to the samples
     /// before it.
     pub(crate) fn stream(&self, samples: &[f64], hop: usize) -> Option<Stream> {

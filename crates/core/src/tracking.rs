@@ -234,7 +234,7 @@ pub struct Evaluator {
 /// What changes during an evaluation: its buffers. Make one a thread.
 #[derive(Debug, Clone)]
 pub struct EvaluatorState {
-    spectrum: SpectrumState,
+    pub(crate) spectrum: SpectrumState,
     decimated: [Vec<f64>; 2],
     filter: Vec<f64>,
     alignment: Option<AlignmentState>,
@@ -334,7 +334,7 @@ impl Evaluator {
     /// [`Error::Plan`] for a pair of another length or rate, [`Error::NotFinite`], [`Error::NoEnergy`], [`Error::Range`].
     pub fn evaluate(&self, state: &mut EvaluatorState, pair: &Pair<'_>) -> Result<Tracking> {
         if let (Some(alignment), Some(state)) = (&self.alignment, &mut state.alignment) {
-            self.check_plan(pair)?;
+            self.check(pair)?;
             pair.check_samples()?;
             return Ok(alignment.estimate(state, &View::whole(pair), 0, None));
         }
@@ -382,7 +382,20 @@ impl Evaluator {
         Ok((tracking, spectra))
     }
 
-    fn check_plan(&self, pair: &Pair<'_>) -> Result<()> {
+    /// From now on only `bins` count; returns what makes good the droop of the cascade at each of them.
+    pub(crate) fn keep_only(&mut self, bins: &[usize]) -> Vec<f64> {
+        let first = self.spectrum.first();
+        let factors: Vec<f64> = bins.iter().map(|b| self.correction.as_ref().map_or(1.0, |c| c[b - first])).collect();
+        let mut kept = vec![0.0; self.n_bins()];
+        for (b, factor) in bins.iter().zip(&factors) {
+            kept[b - first] = *factor;
+        }
+        self.correction = Some(kept);
+        factors
+    }
+
+    /// Refuses a pair of another length or rate.
+    pub(crate) fn check(&self, pair: &Pair<'_>) -> Result<()> {
         let found = (pair.n_samples(), pair.rate_hz());
         if found == (self.n_samples, self.rate_hz) {
             return Ok(());
@@ -390,8 +403,8 @@ impl Evaluator {
         Err(Error::Plan { expected: (self.n_samples, self.rate_hz), found })
     }
 
-    fn transform(&self, state: &mut EvaluatorState, pair: &Pair<'_>) -> Result<()> {
-        self.check_plan(pair)?;
+    pub(crate) fn transform(&self, state: &mut EvaluatorState, pair: &Pair<'_>) -> Result<()> {
+        self.check(pair)?;
         let EvaluatorState { spectrum, decimated: [target, measured], filter, .. } = state;
         let (target, measured) = match &self.chebyshev {
             Some(chebyshev) => {
@@ -406,45 +419,39 @@ impl Evaluator {
     }
 
     /// Eqs 10 and 11 from the sums.
-    fn finish(&self, sums: Sums, pair: &Pair<'_>) -> Result<Tracking> {
-        let Sums { cross, power, moment, energy } = sums;
-        let cross_size = cross.re.abs().max(cross.im.abs());
-        if ![cross_size, power, moment, energy].iter().all(|v| v.is_finite()) {
+    pub(crate) fn finish(&self, sums: Sums, pair: &Pair<'_>) -> Result<Tracking> {
+        let cross_size = sums.cross_size();
+        if ![cross_size, sums.power, sums.moment, sums.energy].iter().all(|v| v.is_finite()) {
             // A transform carries one NaN into every bin; only then is it looked for.
             pair.check_finite()?;
         }
-        let power_in_range = SUMS.contains(&power) && SUMS.contains(&energy) && moment.is_finite();
-        // Below this the kept bins hold only the round-off of the others.
-        let round_off = self.spectrum.fft_len() as f64 * energy_at_least(pair.target()) * ROUND_OFF_SHARE;
-        if !power_in_range || energy <= round_off {
+        let Some(tracking) = sums.tracking(self.delta_f_hz(), self.round_off(pair)) else {
             let peak = peak(pair.target());
             // The energy is summed beside the weights, so both must fit.
             let fits = |power| SUMS.contains(&weight(peak * peak, power));
-            return Err(if fits(2) && fits(self.config.weight_power) && power.is_finite() {
+            return Err(if fits(2) && fits(self.config.weight_power) && sums.power.is_finite() {
                 Error::NoEnergy
             } else {
                 Error::Range { signal: Signal::Target, peak, weight_power: self.config.weight_power }
             });
-        }
-        let fei = cross / power;
-        if !(SUMS.contains(&cross_size) && SUMS.contains(&fei.norm())) {
+        };
+        if !(SUMS.contains(&cross_size) && SUMS.contains(&tracking.amplitude)) {
             let peak = peak(pair.measured());
             if peak > 0.0 {
                 return Err(Error::Range { signal: Signal::Measured, peak, weight_power: self.config.weight_power });
             }
         }
-        let equivalent_frequency_hz = moment / power * self.delta_f_hz();
-        // A sensor that reports nothing is not in time: it has no phase.
-        let phase_rad = if cross_size == 0.0 { f64::NAN } else { fei.im.atan2(fei.re) };
-        Ok(Tracking {
-            fei,
-            amplitude: fei.norm(),
-            phase_rad,
-            delay_s: delay(phase_rad, equivalent_frequency_hz),
-            equivalent_frequency_hz,
-            reason: None,
-            ..Tracking::undetermined(Reason::Still)
-        })
+        Ok(tracking)
+    }
+
+    /// Energy below which bins hold only the round-off of the others.
+    pub(crate) fn round_off(&self, pair: &Pair<'_>) -> f64 {
+        self.spectrum.fft_len() as f64 * energy_at_least(pair.target()) * ROUND_OFF_SHARE
+    }
+
+    /// The plan of the bins.
+    pub(crate) fn spectrum(&self) -> &Spectrum {
+        &self.spectrum
     }
 }
 
@@ -475,13 +482,89 @@ fn weight(squared: f64, power: u32) -> f64 {
 }
 
 /// The sums of Eqs 7 and 12, frequency in bins.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Sums {
     pub(crate) cross: Complex<f64>,
     pub(crate) power: f64,
     pub(crate) moment: f64,
     /// sum |I|^2, which is `power` for l = 2.
-    energy: f64,
+    pub(crate) energy: f64,
+}
+
+impl Sums {
+    /// Adds what bin `k` holds.
+    #[inline(always)]
+    pub(crate) fn add_term(&mut self, term: &Term, k: usize) {
+        self.cross.re += term.re;
+        self.cross.im += term.im;
+        self.power += term.power;
+        self.moment += k as f64 * term.power;
+        self.energy += term.squared;
+    }
+
+    /// Adds the sums over other bins.
+    pub(crate) fn add(&mut self, other: &Sums) {
+        self.cross += other.cross;
+        self.power += other.power;
+        self.moment += other.moment;
+        self.energy += other.energy;
+    }
+
+    fn cross_size(&self) -> f64 {
+        self.cross.re.abs().max(self.cross.im.abs())
+    }
+
+    /// Eqs 10 and 11; `None` where the sums leave double precision or hold no more than `round_off`.
+    pub(crate) fn tracking(&self, delta_f_hz: f64, round_off: f64) -> Option<Tracking> {
+        let Self { cross, power, moment, energy } = *self;
+        let in_range = SUMS.contains(&power) && SUMS.contains(&energy) && moment.is_finite();
+        if !in_range || energy <= round_off {
+            return None;
+        }
+        let fei = cross / power;
+        let equivalent_frequency_hz = moment / power * delta_f_hz;
+        // A sensor that reports nothing is not in time: it has no phase.
+        let phase_rad = if self.cross_size() == 0.0 { f64::NAN } else { fei.im.atan2(fei.re) };
+        Some(Tracking {
+            fei,
+            amplitude: fei.norm(),
+            phase_rad,
+            delay_s: delay(phase_rad, equivalent_frequency_hz),
+            equivalent_frequency_hz,
+            reason: None,
+            ..Tracking::undetermined(Reason::Still)
+        })
+    }
+}
+
+/// What one bin adds to the sums.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Term {
+    /// O conj(I) |I|^(l-2)
+    pub(crate) re: f64,
+    pub(crate) im: f64,
+    /// |I|^l
+    pub(crate) power: f64,
+    /// |I|^2
+    pub(crate) squared: f64,
+}
+
+impl Term {
+    /// Of target (ir, ii) and measured (or, oi). `L` = 2 is compiled apart; 0 stands for any power.
+    #[inline(always)]
+    pub(crate) fn new<const L: u32>(weight_power: u32, (ir, ii): (f64, f64), (or, oi): (f64, f64)) -> Self {
+        let squared = ir * ir + ii * ii;
+        let (mut re, mut im) = (or * ir + oi * ii, oi * ir - or * ii);
+        let mut power = squared;
+        if L != 2 {
+            power = weight(squared, weight_power);
+            // l = 1: O conj(I) / |I| goes to zero with I.
+            let factor = if squared > 0.0 { power / squared } else { 0.0 };
+            re *= factor;
+            im *= factor;
+        }
+        Self { re, im, power, squared }
+    }
 }
 
 /// Sums over the kept bins of a pair of packed transforms, target first.
@@ -547,21 +630,14 @@ impl<const L: u32, const CORRECT: bool> Sink for Weigh<'_, L, CORRECT> {
                 let factor = self.correction[bins.first - self.first + i];
                 (ir, ii, or, oi) = (ir * factor, ii * factor, or * factor, oi * factor);
             }
-            let squared = ir * ir + ii * ii;
-            let (mut re, mut im) = (or * ir + oi * ii, oi * ir - or * ii);
-            let mut power = squared;
+            let term = Term::new::<L>(self.weight_power, (ir, ii), (or, oi));
             if L != 2 {
-                power = weight(squared, self.weight_power);
-                // l = 1: O conj(I) / |I| goes to zero with I.
-                let factor = if squared > 0.0 { power / squared } else { 0.0 };
-                re *= factor;
-                im *= factor;
-                self.energy[i] += squared;
+                self.energy[i] += term.squared;
             }
-            self.re[i] += re;
-            self.im[i] += im;
-            self.power[i] += power;
-            self.moment[i] += (bins.first + i) as f64 * power;
+            self.re[i] += term.re;
+            self.im[i] += term.im;
+            self.power[i] += term.power;
+            self.moment[i] += (bins.first + i) as f64 * term.power;
         }
     }
 }

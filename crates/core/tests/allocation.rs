@@ -6,7 +6,7 @@ use std::cell::Cell;
 use rthstrack::dynamics::{
     Actuator, BoucWen, Compensation, Converter, Delay, Dynamics, Law, Motion, SampledActuator, ServoHydraulic,
 };
-use rthstrack::{Decimator, Detrend, Evaluator, EvaluatorConfig, Pair, Window};
+use rthstrack::{Decimator, Detrend, Evaluator, EvaluatorConfig, KeyFrequencies, KeyFrequenciesConfig, Pair, Window};
 
 thread_local! {
     static COUNT: Cell<usize> = const { Cell::new(0) };
@@ -45,6 +45,15 @@ fn evaluating_allocates_nothing() {
         let before = COUNT.with(Cell::get);
         evaluator.evaluate(&mut state, &pair).unwrap();
         assert_eq!(COUNT.with(Cell::get), before, "{config:?}");
+    }
+    for (share, direct) in [(0.9, true), (0.99999, false)] {
+        let evaluator = EvaluatorConfig::default();
+        let key = KeyFrequencies::new(&target, 1000.0, KeyFrequenciesConfig { share, evaluator }).unwrap();
+        assert_eq!(key.is_direct(), direct);
+        let mut state = key.state();
+        let before = COUNT.with(Cell::get);
+        key.evaluate(&mut state, &pair).unwrap();
+        assert_eq!(COUNT.with(Cell::get), before, "key frequencies");
     }
     let before = COUNT.with(Cell::get);
     drop(std::hint::black_box(vec![1.0f64]));

@@ -4,7 +4,9 @@ use pyo3::prelude::*;
 
 mod dynamics;
 mod error;
+mod factors;
 mod indices;
+mod key_frequencies;
 mod moving;
 mod response;
 mod signal;
@@ -15,6 +17,9 @@ mod tracking;
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     m.add_class::<tracking::Evaluator>()?;
+    m.add_class::<key_frequencies::KeyFrequencies>()?;
+    m.add_function(wrap_pyfunction!(factors::choose_factors, m)?)?;
+    m.add_function(wrap_pyfunction!(factors::prior_bounds, m)?)?;
     m.add_function(wrap_pyfunction!(moving::evaluate_moving, m)?)?;
     m.add_function(wrap_pyfunction!(response::frequency_response, m)?)?;
     m.add_function(wrap_pyfunction!(indices::indices, m)?)?;

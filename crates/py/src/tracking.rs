@@ -149,20 +149,24 @@ impl Evaluator {
         call: impl Fn(&mut EvaluatorState, &Pair<'_>) -> rthstrack::Result<T> + Sync,
     ) -> PyResult<Vec<T>> {
         let (target, measured) = (Columns::new(target)?, Columns::new(measured)?);
-        let results = py.detach(|| {
-            let mut state = self.lock().pop().unwrap_or_else(|| self.plan.state());
-            let judge = |state: &mut EvaluatorState, a: usize| {
-                call(state, &Pair::new(target.at(a), measured.at(a), self.plan.rate_hz())?)
-            };
-            let results: Result<Vec<T>, _> =
-                (0..target.len()).map(|a| judge(&mut state, a).map_err(|e| (a, e))).collect();
-            self.lock().push(state);
-            results
+        let judge = |state: &mut EvaluatorState, a: usize| {
+            call(state, &Pair::new(target.at(a), measured.at(a), self.plan.rate_hz())?)
+        };
+        let results: Result<Vec<T>, _> = py.detach(|| {
+            self.with_state(|_, state| (0..target.len()).map(|a| judge(state, a).map_err(|e| (a, e))).collect())
         });
         results.map_err(|(actuator, error)| match target {
             Columns::One(_) => to_py(py, &error),
             Columns::Many(_) => of_actuator(py, actuator, &error),
         })
+    }
+
+    /// Calls with the plan and a state from the pool.
+    pub(crate) fn with_state<T>(&self, call: impl FnOnce(&rthstrack::Evaluator, &mut EvaluatorState) -> T) -> T {
+        let mut state = self.lock().pop().unwrap_or_else(|| self.plan.state());
+        let result = call(&self.plan, &mut state);
+        self.lock().push(state);
+        result
     }
 
     /// A state holds nothing between calls, so one left by a panic is as good as new.

@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rthstrack.assessment import Assessment, Limits, assess, result_entry
-from rthstrack.cli.arguments import add_method, add_signals, path, positive, power_of_two, weight_power
+from rthstrack.cli.arguments import add_method, add_signals, factor, path, positive, tolerance, weight_power
 from rthstrack.errors import RecordingError, RthstrackError, SettingError, SignalError
+from rthstrack.factors import TOLERANCE
 from rthstrack.recording import Recording, propose_pair, read_recording
 from rthstrack.tracking import Settings
 
@@ -43,8 +44,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     signals = add_signals(parser, "signals (a channel is named by name, path or #index)")
     signals.add_argument("--command", action="append", metavar="C", help="what compensation sends: judged apart")
     method = add_method(parser)
-    method.add_argument("-P", type=power_of_two, default=1, metavar="N", help="data decimation, a power of two")
-    method.add_argument("-Q", type=power_of_two, default=1, metavar="N", help="frequency decimation, a power of two")
+    method.add_argument("-P", type=factor, default=1, metavar="N", help="data decimation, a power of two, or auto")
+    method.add_argument("-Q", type=factor, default=1, metavar="N", help="frequency decimation, a power of two, or auto")
+    method.add_argument("--tolerance", type=tolerance, metavar="X",
+                        help="auto takes the largest P and Q that change amplitude and delay by at most this share, of "
+                        f"the whole record ({TOLERANCE}); moving windows then keep P = Q = 1")  # fmt: skip
     method.add_argument("--weight-power", type=weight_power, default=2, metavar="L", help="bins weigh |target|^L (2)")
     windows = ("boxcar", "hann", "hamming", "blackman", "flattop", "tukey")
     method.add_argument("--window", choices=windows, default="boxcar", metavar="W", help=f"one of {', '.join(windows)}")
@@ -147,6 +151,8 @@ def _assess(
             answered.values,
             recording.rate_hz,
             settings=_settings(args),
+            choose=tuple(name for name, given in (("P", args.P), ("Q", args.Q)) if given is None),
+            tolerance=args.tolerance or TOLERANCE,
             moving_s=args.moving,
             hop_s=args.hop,
             limits=Limits(args.limit_delay, args.limit_amplitude) if part == "whole" else None,
@@ -176,8 +182,8 @@ def _assess(
 def _settings(args: argparse.Namespace) -> Settings:
     return Settings(
         estimator=args.estimator,
-        data_decimation=args.P,
-        frequency_decimation=args.Q,
+        data_decimation=args.P or 1,
+        frequency_decimation=args.Q or 1,
         decimator=args.decimator,
         weight_power=args.weight_power,
         window=args.window,
@@ -193,6 +199,11 @@ def _check(args: argparse.Namespace, misuse: Callable[[str], Any]) -> None:
         misuse(f"--target and --measured go in pairs, found {len(targets)} and {len(measured)}")
     if commands and targets and len(commands) != len(targets):
         misuse(f"one --command for each --target is needed, found {len(commands)} for {len(targets)}")
+    chosen = args.P is None or args.Q is None
+    if args.tolerance is not None and not chosen:
+        misuse("--tolerance speaks of P and Q that are chosen: give -P auto, -Q auto or both")
+    if chosen and args.decimator != "spectral":
+        misuse(f"-P auto and -Q auto need --decimator spectral, found {args.decimator}")
     if args.band and args.band[0] > args.band[1]:
         misuse(f"--band LO HI: LO must not exceed HI, found {args.band[0]:g} {args.band[1]:g}")
     if args.start is not None and args.end is not None and args.start >= args.end:
@@ -342,6 +353,7 @@ def _print_one(console: Console, a: Assessment) -> None:
         ("delay", f"{1e3 * float(t.delay_s):.6g} ms"),
         ("phase", f"{math.degrees(float(t.phase_rad)):.5g} degrees at {float(t.equivalent_frequency_hz):.5g} Hz"),
         ("bins", f"{t.n_bins}, every {t.delta_f_hz:.4g} Hz{band}"),
+        *([("P and Q chosen", a.factors.sentence)] if a.factors else []),
         ("moving windows", _moving_text(a)),
         ("max tracking error", f"{i.max_tracking_error:.4g}{unit} ({i.max_tracking_error_percent:.3g} %)"),
         ("rms error", f"{i.rms_error:.4g}{unit} ({i.rms_error_percent:.3g} %)"),
@@ -366,9 +378,17 @@ def _moving_text(a: Assessment) -> str:
     delays, amplitudes = 1e3 * a.moving.delay_s[valid], a.moving.amplitude[valid]
     (low, high), (small, large) = np.quantile(delays, (0.1, 0.9)), np.quantile(amplitudes, (0.1, 0.9))
     return (
-        f"of {a.moving.window_s:g} s: delay {low:.4g} to {high:.4g} ms, amplitude {small:.4g} to {large:.4g} "
-        f"(10 to 90 % of {valid.sum()} readings)"
+        f"of {a.moving.window_s:g} s{_moving_factors(a)}: delay {low:.4g} to {high:.4g} ms, "
+        f"amplitude {small:.4g} to {large:.4g} (10 to 90 % of {valid.sum()} readings)"
     )
+
+
+def _moving_factors(a: Assessment) -> str:
+    """P and Q of the windows, where others were chosen for the record."""
+    if a.factors is None or a.moving is None:
+        return ""
+    s = a.moving.settings
+    return f" at P = {s.data_decimation}, Q = {s.frequency_decimation}"
 
 
 def _print_table_of_all(console: Console, assessments: Sequence[Assessment]) -> None:

@@ -14,9 +14,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rthstrack.assessment import json_ready
-from rthstrack.cli.arguments import add_method, add_signals, count, number, positive
+from rthstrack.cli.arguments import add_method, add_signals, count, number, positive, tolerance
 from rthstrack.errors import RthstrackError, SettingError
-from rthstrack.studies import COMBINED, POWERS, WEIGHT_POWERS, WINDOWS, Pair, Study, StudySettings, read_pairs, study
+from rthstrack.factors import TOLERANCE
+from rthstrack.studies import (
+    COMBINED,
+    POWERS,
+    WEIGHT_POWERS,
+    WINDOWS,
+    Pair,
+    Study,
+    StudySettings,
+    _several,
+    read_pairs,
+    study,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -41,6 +53,7 @@ _EPILOG = """\
 examples:
   rthstrack study run.h5 -o study
   rthstrack study test.csv --target cmd --measured meas --true-delay 0.012 -o study
+  rthstrack study run.h5 -P auto -Q auto --tolerance 0.005 --share 0.99,0.999
   rthstrack study test.csv -P 1,4,16 -Q 1,2,4,8 --windows boxcar,tukey --weight-powers 1,2 --json
 
 With -o DIR: study.csv (a row a cell with every setting in it; a cell that leaves nothing to judge
@@ -66,8 +79,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("sources", nargs="+", metavar="SOURCE", help="recorded test, run file or configuration (.toml)")
     grid = parser.add_argument_group("grid (lists with commas)")
     powers = f"{POWERS[0]},{POWERS[1]},...,{POWERS[-1]}"
-    grid.add_argument("-P", metavar="LIST", help=f"data decimations, powers of two (default: {powers})")
-    grid.add_argument("-Q", metavar="LIST", help=f"frequency decimations, powers of two (default: {powers})")
+    grid.add_argument(
+        "-P",
+        metavar="LIST",
+        help=f"data decimations, powers of two (default: {powers})"
+        "; auto among them adds the one that --tolerance allows",
+    )
+    grid.add_argument(
+        "-Q", metavar="LIST", help=f"frequency decimations, powers of two (default: {powers}); auto likewise"
+    )
     grid.add_argument("--combined", nargs=2, type=count, metavar=("P", "Q"),
                       help="largest P and Q taken together; each alone goes as far as its list (default: "
                       f"{COMBINED[0]} {COMBINED[1]}, or every P with every Q where -P or -Q is given)")  # fmt: skip
@@ -75,6 +95,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
                       help="of boxcar, hann, hamming, blackman, flattop, tukey (default: %(default)s)")  # fmt: skip
     grid.add_argument("--weight-powers", default=",".join(map(str, WEIGHT_POWERS)), metavar="LIST",
                       help="bins weigh |target|^L, 1 to 16 (default: %(default)s)")  # fmt: skip
+    grid.add_argument("--tolerance", type=tolerance, metavar="X",
+                      help="auto takes the largest P and Q that change amplitude and delay by at most this share "
+                      f"({TOLERANCE}); with auto for one of them the other is 1")  # fmt: skip
+    grid.add_argument(
+        "--share",
+        metavar="LIST",
+        help="also the fewest bins that hold this share of the weight, such as 0.999, evaluated alone",
+    )
     add_signals(parser, "signals of recorded tests (a channel is named by name, path or #index)")
     truth = parser.add_argument_group("truth, in place of what a run or configuration says itself")
     truth.add_argument("--true-amplitude", type=positive, metavar="X", help="measured over target")
@@ -98,9 +126,13 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
         misuse(f"--start must come before --end, found {args.start:g} and {args.end:g}")
     if args.no_figures and args.output is None:
         misuse("--no-figures speaks of what -o DIR writes: give -o DIR")
+    p, q = _grid_list(args.P), _grid_list(args.Q)
+    choose = tuple(name for name, given in (("P", args.P), ("Q", args.Q)) if given and "auto" in _items(given))
+    if args.tolerance is not None and not choose:
+        misuse("--tolerance speaks of P and Q that are chosen: give -P auto, -Q auto or both")
     settings = StudySettings(
-        None if args.P is None else _numbers(args.P),
-        None if args.Q is None else _numbers(args.Q),
+        p,
+        q,
         args.combined and tuple(args.combined),
         _items(args.windows),
         _numbers(args.weight_powers),
@@ -109,6 +141,9 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
         args.detrend,
         args.band and tuple(args.band),
         not args.no_timing,
+        choose,
+        args.tolerance or TOLERANCE,
+        () if args.share is None else _several("share", _items(args.share)),
     ).checked()
     _make(args.output)
     pairs, failures = _read_all(args)
@@ -139,6 +174,13 @@ def _items(text: str) -> tuple[str, ...]:
 def _numbers(text: str) -> tuple[Any, ...]:
     """Whole numbers; what is none stays text, for the check to name."""
     return tuple(int(item) if item.removeprefix("-").isdecimal() else item for item in _items(text))
+
+
+def _grid_list(text: str | None) -> tuple[Any, ...] | None:
+    """The numbers of -P or -Q; None, the default, where there are none but auto."""
+    if text is None or set(_items(text)) == {"auto"}:
+        return None
+    return tuple(number for number in _numbers(text) if number != "auto")
 
 
 def _truth(args: argparse.Namespace) -> tuple[float, float] | None:
@@ -236,13 +278,16 @@ def _print_text(found: Study) -> None:
     console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 200)
     if len(found.sources) > 1:
         _print_summary(console, found)
+        _print_beside(console, found)
     for source in found.sources:
         if len(found.sources) == 1:
             about = f"{source.target_name}, {source.measured_name}, {source.n_samples} samples at {source.rate_hz:g} Hz"
             console.print(Text(source.name, style="bold") + Text(f": {about}", style="dim"))
             for window in found.settings.windows:
                 for power in found.settings.weight_powers:
-                    _print_grid(console, found, found.select(source=source.name, window=window, weight_power=power))
+                    kind: Any = {"source": source.name, "window": window, "weight_power": power}
+                    beside = [c for c in found.select(**kind, kind=None) if c.kind != "grid"]
+                    _print_grid(console, found, found.select(**kind), beside)
         for note in source.notes:
             console.print(Text(f"{source.name}: ", style="yellow") + Text(note))
     if invalid := [cell for cell in found.cells if cell.reason]:
@@ -250,8 +295,8 @@ def _print_text(found: Study) -> None:
         console.print(Text(count, style="yellow") + Text(invalid[0].reason))
 
 
-def _print_grid(console: Console, found: Study, cells: Sequence[Cell]) -> None:
-    """P alone and Q alone as one table, the combinations as small ones beside each other."""
+def _print_grid(console: Console, found: Study, cells: Sequence[Cell], beside: Sequence[Cell]) -> None:
+    """P alone, Q alone, chosen factors and key frequencies as one table, the combinations as small ones."""
     from rich.columns import Columns
     from rich.text import Text
 
@@ -270,23 +315,25 @@ def _print_grid(console: Console, found: Study, cells: Sequence[Cell]) -> None:
     ]
     for name in [*names, *(["time us"] if found.settings.timing else [])]:
         alone.add_column(name, justify="right", no_wrap=True)
+    if beside:
+        alone.add_column("")
     by_p = [c for c in cells if c.settings.frequency_decimation == 1]
     by_q = [c for c in cells if c.settings.data_decimation == 1]
     sections = [section for section in (by_p, by_q) if len(section) > 1] or [by_p or by_q]
-    for section in sections:
+    for section in [*sections, *([beside] if beside else [])]:
         if section is not sections[0]:
             alone.add_row()
         for c in section:
             a, d = (c.amplitude_error, c.delay_error) if known else (c.amplitude_change, c.delay_change)
             alone.add_row(
-                str(c.settings.data_decimation),
-                str(c.settings.frequency_decimation),
+                *_factors_text(c),
                 _text(c.amplitude, ".5f"),
                 _text(100 * a, "+.3f"),
                 _text(1e3 * c.delay_s, ".4f"),
                 _text(100 * d, "+.3f"),
                 _text(c.equivalent_frequency_hz, ".4g"),
                 *([_text(1e6 * c.computing_time_s, ".1f")] if found.settings.timing else []),
+                *([Text(_beside_text(c))] if beside else []),
             )
     if alone.row_count:
         console.print(alone)
@@ -296,6 +343,51 @@ def _print_grid(console: Console, found: Study, cells: Sequence[Cell]) -> None:
         if found.settings.timing:
             shown.append(("time us", lambda c: _text(1e6 * c.computing_time_s, ".0f")))
         console.print(Columns([_matrix(name, cells, both, write) for name, write in shown], padding=(0, 4)))
+
+
+def _factors_text(c: Cell) -> tuple[str, str]:
+    """P and Q; key frequencies have none."""
+    if c.kind == "key":
+        return "key", ""
+    return str(c.settings.data_decimation), str(c.settings.frequency_decimation)
+
+
+def _beside_text(c: Cell) -> str:
+    """Of chosen factors the bound, of key frequencies how many there are; nothing of the grid."""
+    if c.kind == "grid" or c.reason:
+        return c.reason and "not determined"
+    if c.kind == "key":
+        return f"{c.n_bins} key frequencies hold {c.share:g} of the weight"
+    delay = f"d {100 * c.delay_bound:.2g} %" if c.delay_measure == "relative" else f"phase {c.delay_bound:.2g} rad"
+    return f"chosen: changes A by at most {100 * c.amplitude_bound:.2g} %, {delay} (tolerance {100 * c.tolerance:g} %)"
+
+
+def _print_beside(console: Console, found: Study) -> None:
+    """A line each for the chosen factors and key frequencies of several sources."""
+    from rich.text import Text
+
+    cells = [c for c in found.cells if c.kind != "grid"]
+    if not cells:
+        return
+    table = _table()
+    table.add_column("source", overflow="fold")
+    table.add_column("window")
+    for name in ("l", "P", "Q", "A change %", "d change %", *(["time us"] if found.settings.timing else [])):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("")
+    for c in cells:
+        table.add_row(
+            Text(c.source),
+            c.settings.window,
+            str(c.settings.weight_power),
+            *_factors_text(c),
+            _text(100 * c.amplitude_change, "+.3f"),
+            _text(100 * c.delay_change, "+.3f"),
+            *([_text(1e6 * c.computing_time_s, ".1f")] if found.settings.timing else []),
+            Text(_beside_text(c)),
+        )
+    console.print()
+    console.print(table)
 
 
 def _matrix(name: str, cells: Sequence[Cell], both: Sequence[Cell], write: Callable[[Cell], str]) -> Table:
