@@ -23,6 +23,7 @@ from rthstrack.studies import Study, study
 from rthstrack.tracking import (
     Evaluator,
     FrequencyResponse,
+    FrequencySlopes,
     IndexHistories,
     Indices,
     MovingTracking,
@@ -31,6 +32,7 @@ from rthstrack.tracking import (
     evaluate,
     evaluate_moving,
     frequency_response,
+    frequency_slopes,
     index_histories,
     indices,
 )
@@ -55,6 +57,7 @@ __all__ = [
     "DelayDamping",
     "Evaluator",
     "FrequencyResponse",
+    "FrequencySlopes",
     "GroundMotion",
     "IndexHistories",
     "Indices",
@@ -78,6 +81,7 @@ __all__ = [
     "evaluate",
     "evaluate_moving",
     "frequency_response",
+    "frequency_slopes",
     "index_histories",
     "indices",
     "list_records",

@@ -11,8 +11,9 @@
 //! 4. `spectrum`: Q by folding, the transform, the kept bins.
 //! 5. [`tracking`]: Eqs 6-12, amplitude and delay; [`Evaluator`] is the plan, [`EvaluatorState`] its buffers.
 //! 6. [`moving`]: the same over moving windows.
-//! 7. [`response`]: gain, phase, delay and coherence over frequency.
-//! 8. [`mod@indices`]: the time-domain indices in use beside them.
+//! 7. [`response`]: gain, phase, delay and coherence over frequency, with intervals.
+//! 8. [`slopes`]: the same as two straight lines.
+//! 9. [`mod@indices`]: the time-domain indices in use beside them.
 //!
 //! [`dynamics`] makes such signals: virtual tests of structures with actuators that lag. It and the evaluation do not know
 //! each other.
@@ -27,7 +28,9 @@ pub mod error;
 pub mod indices;
 pub mod moving;
 pub mod pair;
+mod quantile;
 pub mod response;
+pub mod slopes;
 mod spectrum;
 pub mod tracking;
 pub mod window;
@@ -38,5 +41,6 @@ pub use indices::{IndexHistories, Indices, index_histories, indices};
 pub use moving::{MovingConfig, MovingTracking, evaluate_moving};
 pub use pair::Pair;
 pub use response::{FrequencyResponse, ResponseConfig, frequency_response};
+pub use slopes::{FrequencySlopes, Slope, SlopesConfig, frequency_slopes};
 pub use tracking::{Estimator, Evaluator, EvaluatorConfig, EvaluatorState, Spectra, Tracking};
 pub use window::{Detrend, Window};
