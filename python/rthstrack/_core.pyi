@@ -76,7 +76,7 @@ def evaluate_moving(
     settings: Settings,
 ) -> tuple[_Array, _Array, _Array, _Array, _Array, NDArray[np.bool_]]: ...
 
-_ResponseSettings = tuple[float | None, float, str, str, float]
+_ResponseSettings = tuple[float | None, float, str, str, float, bool]
 
 def frequency_response(
     target: NDArray[Any],
@@ -97,7 +97,7 @@ def frequency_slopes(
     band_hz: tuple[float, float] | None,
     keep_alignment: bool,
     settings: _ResponseSettings,
-) -> tuple[float, _Slope, _Slope, _Interval, int, float, int, float]: ...
+) -> tuple[float, _Slope, _Slope, _Interval, int, float, bool, int, float]: ...
 def indices(
     target: NDArray[Any],
     measured: NDArray[Any],

@@ -258,6 +258,7 @@ class FrequencyResponse(_Result):
     window: str
     detrend: str
     align_s: float
+    dispersion: bool
     rate_hz: float
 
     def _columns(self) -> dict[str, Any]:
@@ -304,6 +305,7 @@ class FrequencySlopes(_Result):
     band_hz: tuple[float, float]
     n_bins: int
     align_s: float
+    dispersion: bool
     segment_s: float
     overlap: float
     n_segments: int
@@ -568,6 +570,7 @@ def frequency_response(
     window: str = "hann",
     detrend: str = "mean",
     align_s: float = 0.0,
+    dispersion: bool = False,
 ) -> FrequencyResponse:
     """Gain, phase, delay and coherence of measured over target at every frequency, by Welch's method, with intervals.
 
@@ -578,8 +581,10 @@ def frequency_response(
 
     One pair, (n_samples,). segment_s: length of a segment (default: the largest power of two of samples in an eighth of
     the record), zero-padded to a power of two; overlap: share from 0 to below 1.
-    align_s: the delay as far as it is known, as `frequency_slopes` finds it. Without it gain and delay lose a share of
-    up to delay over segment_s, which the intervals do not know: they speak of noise, steady over the record and
+    align_s: the delay as far as it is known, as `frequency_slopes` finds it: target's segments are taken that much
+    earlier. Without it gain and delay lose a share of up to delay over segment_s. dispersion: also corrects, to first
+    order, what segments lose where gain and delay change with frequency; where they do not it only adds noise. The
+    intervals know neither of such losses nor of that: they speak of noise on measured, steady over the record and
     independent of target, white or coloured.
     Intervals are NaN with fewer than 4 degrees of freedom; where they would be wider than a third of the gain to either
     side (coherence too low); at the bins next to zero and Nyquist; for overlaps above 7/8.
@@ -591,9 +596,11 @@ def frequency_response(
     rate_hz = _number("rate_hz", rate_hz)
     segment = None if segment_s is None else _number("segment_s", segment_s)
     share, align_s = _number("overlap", overlap), _number("align_s", align_s)
-    settings = (segment, share, window, detrend, align_s)
+    settings = (segment, share, window, detrend, align_s, bool(dispersion))
     curves, uncertainty, n_segments, length_s = _core.frequency_response(t, m, rate_hz, settings)
-    return FrequencyResponse(*curves, *uncertainty, length_s, share, n_segments, window, detrend, align_s, rate_hz)
+    return FrequencyResponse(
+        *curves, *uncertainty, length_s, share, n_segments, window, detrend, align_s, bool(dispersion), rate_hz
+    )
 
 
 def frequency_slopes(
@@ -615,7 +622,9 @@ def frequency_slopes(
     f_eq = sum f |I|^2 / sum |I|^2 over them.
 
     band_hz: lowest and highest frequency used, both included. align_s: None aligns at the delay found, again until it
-    stands still. Other arguments as in `frequency_response`; at least three bins must be left.
+    stands still. `dispersion` of `frequency_response` is used where gain or delay vary.
+    Other arguments as in `frequency_response`; at least three bins must be left. The intervals speak of noise, not of
+    departures from a straight line, which are `gain_misfit`, `delay_misfit_s`.
     delay_s > 0: measured lags. Raises SignalError, SettingError.
 
     >>> import numpy as np
@@ -631,12 +640,12 @@ def frequency_slopes(
     segment = None if segment_s is None else _number("segment_s", segment_s)
     share = _number("overlap", overlap)
     start_s = 0.0 if align_s is None else _number("align_s", align_s)
-    settings = (segment, share, window, detrend, start_s)
-    f_eq, gain, delay, band, n_bins, found_s, n_segments, length_s = _core.frequency_slopes(
+    settings = (segment, share, window, detrend, start_s, False)
+    f_eq, gain, delay, band, n_bins, found_s, dispersion, n_segments, length_s = _core.frequency_slopes(
         t, m, rate_hz, _band(band_hz), align_s is not None, settings
     )
     return FrequencySlopes(
-        f_eq, *gain, *delay, band, n_bins, found_s, length_s, share, n_segments, window, detrend, rate_hz
+        f_eq, *gain, *delay, band, n_bins, found_s, dispersion, length_s, share, n_segments, window, detrend, rate_hz
     )
 
 

@@ -12,6 +12,10 @@
 //!
 //! so that S is known from the residuals whichever segments hold the motion, with 2 tr(P R)^2 / tr(P R P R) degrees of
 //! freedom (Satterthwaite). Half of var H is along H and half across it.
+//!
+//! A window sees frequencies around f, over which H(v) = H (1 + (H'/H) (v - f)). To first order that is H times the target under
+//! a window moved by c = i H'/(2 pi H), complex where the gain changes: I_s + c D_s with D_s the target under the window's
+//! derivative. `dispersion` puts that in the place of I_s, H'/H from neighbouring bins.
 
 use std::collections::VecDeque;
 use std::f64::consts::PI;
@@ -38,6 +42,12 @@ const MAX_SHARING: usize = 7;
 const MIN_DEGREES: f64 = 4.0;
 /// Half the width of an interval, as a share of the gain, up to which gain and phase are linear in the noise.
 const LINEAR: f64 = 1.0 / 3.0;
+/// Bins to either side from which a bin's H'/H is taken.
+const NEIGHBOURS: usize = 4;
+/// Turns of H from H'/H and H'/H from H; the first leaves a share of about the delay over the segment's length.
+const MAX_TURNS: usize = 4;
+/// Share of a segment by which a window may be moved to first order.
+const SMALL_SHIFT: f64 = 0.1;
 /// Share of a bin's noise that may be tied to its mirror image at negative frequency, or be taken away by detrending.
 const MIRRORED: f64 = 0.1;
 
@@ -54,11 +64,20 @@ pub struct ResponseConfig {
     pub detrend: Detrend,
     /// The delay, as far as it is known, in seconds: target's segments are taken that much earlier than measured's.
     pub align_s: f64,
+    /// Whether to correct what windows make of a gain and a delay that change from bin to bin, or differ from `align_s`.
+    pub dispersion: bool,
 }
 
 impl Default for ResponseConfig {
     fn default() -> Self {
-        Self { segment_s: None, overlap: 0.5, window: Window::Hann, detrend: Detrend::Mean, align_s: 0.0 }
+        Self {
+            segment_s: None,
+            overlap: 0.5,
+            window: Window::Hann,
+            detrend: Detrend::Mean,
+            align_s: 0.0,
+            dispersion: false,
+        }
     }
 }
 
@@ -102,6 +121,7 @@ pub struct FrequencyResponse {
 /// S_IO = mean conj(I) O, so that its phase is negative on lag. A delay tau moves motion out of the window that it stood in,
 /// which costs a share of up to tau over the segment's length of gain and delay; `align_s` gives it back (Bendat and Piersol
 /// 2010, section 9.1): whole samples by taking target's segments earlier, the rest by moving the window over the target.
+/// `dispersion` does so at every bin, to first order.
 ///
 /// # Errors
 /// [`Error::TooShort`], [`Error::Setting`] for a segment, overlap or alignment that leaves fewer than two segments,
@@ -143,7 +163,7 @@ pub fn frequency_response(pair: &Pair<'_>, config: &ResponseConfig) -> Result<Fr
         delay_std_s,
         delay_interval_s,
         n_segments: welch.n_segments,
-        segment_s: welch.segment as f64 / pair.rate_hz(),
+        segment_s: welch.segment_s,
     })
 }
 
@@ -158,15 +178,20 @@ pub(crate) struct Welch {
     /// Windows over target and measured; they differ by the rest of the alignment.
     windows: [Option<Vec<f64>>; 2],
     detrend: Detrend,
+    /// The derivative of target's window, a second, where dispersion is corrected.
+    derivative: Option<Vec<f64>>,
+    /// The rest of the alignment, in seconds.
+    rest_s: f64,
     /// sum w^2.
     pub(crate) window_power: f64,
+    pub(crate) segment_s: f64,
 }
 
 impl Welch {
     pub(crate) fn new(pair: &Pair<'_>, config: &ResponseConfig) -> Result<Self> {
         pair.check_samples()?;
         let (n, rate_hz) = (pair.n_samples(), pair.rate_hz());
-        let ResponseConfig { segment_s, overlap, window, detrend, align_s } = *config;
+        let ResponseConfig { segment_s, overlap, window, detrend, align_s, dispersion } = *config;
         if n < MIN_SEGMENT * MIN_SEGMENTS {
             return Err(Error::TooShort { expected: MIN_SEGMENT * MIN_SEGMENTS, found: n });
         }
@@ -216,11 +241,28 @@ impl Welch {
             detrend: Detrend::None,
             band_hz: None,
         })?;
-        let windows = [window.shifted(segment, align_s * rate_hz - lag), window.coefficients(segment)];
+        let rest = align_s * rate_hz - lag;
+        let windows = [window.shifted(segment, rest), window.coefficients(segment)];
+        let half_later = window.shifted(segment, rest + 0.5).filter(|_| dispersion);
+        let derivative = half_later.zip(window.shifted(segment, rest - 0.5)).map(|(later, earlier)| {
+            later.iter().zip(&earlier).map(|(later, earlier)| (later - earlier) * rate_hz).collect()
+        });
         let window_power = windows[1].as_ref().map_or(segment as f64, |w| w.iter().map(|v| v * v).sum());
         let lag = lag as isize;
         let n_segments = (n - lag.unsigned_abs() - segment) / hop + 1;
-        Ok(Self { spectrum, segment, hop, n_segments, lag, windows, detrend, window_power })
+        Ok(Self {
+            spectrum,
+            segment,
+            hop,
+            n_segments,
+            lag,
+            windows,
+            detrend,
+            derivative,
+            rest_s: rest / rate_hz,
+            window_power,
+            segment_s: segment as f64 / rate_hz,
+        })
     }
 
     pub(crate) fn frequency_hz(&self) -> Vec<f64> {
@@ -237,24 +279,35 @@ impl Welch {
 
     /// Calls `each` with every segment's number and its transforms, still packed.
     pub(crate) fn segments(&self, pair: &Pair<'_>, mut each: impl FnMut(usize, &SpectrumState)) {
+        let windows = [self.windows[0].as_deref(), self.windows[1].as_deref()];
+        self.segments_under(&[windows], pair, |s, _, state| each(s, state));
+    }
+
+    /// The same under each of several pairs of windows in turn, with their index.
+    fn segments_under(
+        &self,
+        pairs_of_windows: &[[Option<&[f64]>; 2]],
+        pair: &Pair<'_>,
+        mut each: impl FnMut(usize, usize, &SpectrumState),
+    ) {
         let mut state = self.spectrum.state();
         let mut windowed = [vec![0.0; self.segment], vec![0.0; self.segment]];
         for s in 0..self.n_segments {
-            let ranges = self.ranges(s);
-            for (((samples, range), window), out) in
-                [pair.target(), pair.measured()].into_iter().zip(ranges).zip(&self.windows).zip(&mut windowed)
-            {
-                let samples = &samples[range];
-                out.copy_from_slice(samples);
-                if let Some(line) = self.detrend.line(samples) {
-                    out.iter_mut().enumerate().for_each(|(i, x)| *x -= line.at(i));
+            let [target, measured] = self.ranges(s);
+            let signals = [&pair.target()[target], &pair.measured()[measured]];
+            for (which, windows) in pairs_of_windows.iter().enumerate() {
+                for ((samples, window), out) in signals.into_iter().zip(windows).zip(&mut windowed) {
+                    out.copy_from_slice(samples);
+                    if let Some(line) = self.detrend.line(samples) {
+                        out.iter_mut().enumerate().for_each(|(i, x)| *x -= line.at(i));
+                    }
+                    if let Some(window) = window {
+                        out.iter_mut().zip(*window).for_each(|(x, w)| *x *= w);
+                    }
                 }
-                if let Some(window) = window {
-                    out.iter_mut().zip(window).for_each(|(x, w)| *x *= w);
-                }
+                self.spectrum.transform(&mut state, &windowed[0], &windowed[1]);
+                each(s, which, &state);
             }
-            self.spectrum.transform(&mut state, &windowed[0], &windowed[1]);
-            each(s, &state);
         }
     }
 
@@ -274,10 +327,19 @@ impl Welch {
     }
 
     pub(crate) fn averages(&self, pair: &Pair<'_>) -> Averages {
-        let mut averages = Averages::new(self.spectrum.n_bins());
-        let mut sharing = Sharing::new(self.sharing(), self.spectrum.n_bins());
+        let n_bins = self.spectrum.n_bins();
+        let mut averages = Averages::new(n_bins);
+        let mut sharing = Sharing::new(self.sharing(), n_bins);
+        let mut moved = Moved::new(n_bins);
         let turns = turns(self.spectrum.fft_len());
-        self.segments(pair, |s, state| {
+        let [target, measured] = [0, 1].map(|i| self.windows[i].as_deref());
+        let mut windows = vec![[target, measured]];
+        windows.extend(self.derivative.as_deref().map(|derivative| [Some(derivative), measured]));
+        self.segments_under(&windows, pair, |s, which, state| {
+            if which == 1 {
+                self.spectrum.visit(state, &mut MoveBeside { sums: &mut moved, target: &averages.latest });
+                return;
+            }
             self.spectrum.visit(state, &mut averages);
             // Phases counted from the record's start.
             let start = s * self.hop % turns.len();
@@ -285,7 +347,57 @@ impl Welch {
             sharing.push(turned);
         });
         (averages.shared, averages.shared_squared) = sharing.finish();
+        if self.derivative.is_some() {
+            self.correct(&moved, &mut averages);
+        }
         averages
+    }
+
+    /// Replaces sum |I|^2 and sum conj(I) O by those of I + c D, of which c follows in turn.
+    fn correct(&self, moved: &Moved, averages: &mut Averages) {
+        let (target, cross) = (averages.target.clone(), averages.cross.clone());
+        for _ in 0..MAX_TURNS {
+            let shifts = self.shifts(averages);
+            for (k, c) in shifts.into_iter().enumerate() {
+                averages.target[k] = target[k] + 2.0 * (c * moved.beside[k]).re + c.norm_sqr() * moved.target[k];
+                averages.cross[k] = cross[k] + c.conj() * moved.cross[k];
+            }
+        }
+    }
+
+    /// c = i H'/(2 pi H) less the alignment that the window already has, in seconds; the slope of ln H over neighbouring bins,
+    /// each weighted by its energy.
+    fn shifts(&self, averages: &Averages) -> Vec<Complex<f64>> {
+        let Averages { target, measured, cross, .. } = averages;
+        let n_bins = target.len();
+        let delta_f = self.spectrum.delta_f_hz();
+        let coherent = |k: usize| cross[k].norm() / target[k] * (cross[k].norm() / measured[k]) >= LEADING_COHERENCE;
+        let at = |k: usize| {
+            if !coherent(k) {
+                return None;
+            }
+            let around = k.saturating_sub(NEIGHBOURS)..(k + NEIGHBOURS + 1).min(n_bins);
+            let points = around.filter(|&j| coherent(j)).map(|j| {
+                let ratio = cross[j] / target[j] / (cross[k] / target[k]);
+                (target[j] / target[k], j as f64 - k as f64, ratio.ln())
+            });
+            let (mut sum, mut first, mut log) = (0.0, 0.0, Complex::default());
+            for (weight, x, y) in points.clone() {
+                sum += weight;
+                first += weight * x;
+                log += y * weight;
+            }
+            let (mean, mean_log) = (first / sum, log / sum);
+            let (mut spread, mut slope) = (0.0, Complex::default());
+            for (weight, x, y) in points {
+                spread += weight * (x - mean).powi(2);
+                slope += (y - mean_log) * (weight * (x - mean));
+            }
+            let shift = Complex::<f64>::i() * (slope / spread / delta_f) / (2.0 * PI) - self.rest_s;
+            let largest = SMALL_SHIFT * self.segment_s;
+            (spread > 0.0 && shift.norm() < largest).then_some(shift)
+        };
+        (0..n_bins).map(|k| at(k).unwrap_or_default()).collect()
     }
 
     /// arg H, with the phase of the whole samples put back after unwrapping.
@@ -463,6 +575,42 @@ impl Sink for Averages {
             self.measured[k] += measured.norm_sqr();
             self.cross[k] += target.conj() * measured;
             self.latest[k] = target;
+        }
+    }
+}
+
+/// Sums over the segments with D, target's transform under the derivative of its window.
+struct Moved {
+    /// sum |D|^2
+    target: Vec<f64>,
+    /// sum conj(D) O
+    cross: Vec<Complex<f64>>,
+    /// sum conj(I) D
+    beside: Vec<Complex<f64>>,
+}
+
+impl Moved {
+    fn new(n_bins: usize) -> Self {
+        let zero = vec![Complex::default(); n_bins];
+        Self { target: vec![0.0; n_bins], cross: zero.clone(), beside: zero }
+    }
+}
+
+/// Adds a segment's D to the sums, given its I.
+struct MoveBeside<'a> {
+    sums: &'a mut Moved,
+    target: &'a [Complex<f64>],
+}
+
+impl Sink for MoveBeside<'_> {
+    fn take<const W: usize>(&mut self, bins: &Bins<W>) {
+        for i in 0..W {
+            let k = bins.first - 1 + i;
+            let moved = Complex::new(bins.target_re[i], bins.target_im[i]);
+            let measured = Complex::new(bins.measured_re[i], bins.measured_im[i]);
+            self.sums.target[k] += moved.norm_sqr();
+            self.sums.cross[k] += moved.conj() * measured;
+            self.sums.beside[k] += self.target[k].conj() * moved;
         }
     }
 }

@@ -33,7 +33,7 @@ const BENT: f64 = 3.0;
 /// The user's numbers for [`frequency_slopes`].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SlopesConfig {
-    /// Segments and windows; its `align_s` is where the search for the alignment starts.
+    /// Segments and windows; its `align_s` and `dispersion` are where the search starts.
     pub response: ResponseConfig,
     /// Lowest and highest frequency used, both included, in hertz.
     pub band_hz: Option<(f64, f64)>,
@@ -78,6 +78,8 @@ pub struct FrequencySlopes {
     pub n_bins: usize,
     /// The alignment at which the segments were taken, in seconds.
     pub align_s: f64,
+    /// Whether what windows make of a varying gain and delay was corrected.
+    pub dispersion: bool,
     /// Segments averaged.
     pub n_segments: usize,
     /// Length of a segment, in seconds.
@@ -93,7 +95,8 @@ pub struct FrequencySlopes {
 /// a straight line; those are `misfit`.
 ///
 /// Unless the alignment is kept, the target is aligned at the delay found (where delay varies, at the group delay
-/// d + f_eq d', with which the motion's envelope travels) until that stands still.
+/// d + f_eq d', with which the motion's envelope travels) until that stands still. Where gain or delay vary, dispersion is
+/// corrected; where they do not, that would only add noise.
 ///
 /// # Errors
 /// Those of [`crate::frequency_response`], [`Error::Band`], and [`Error::FewBins`] where fewer than three bins are left.
@@ -106,13 +109,15 @@ pub fn frequency_slopes(pair: &Pair<'_>, config: &SlopesConfig) -> Result<Freque
     let mut response = config.response;
     let mut found = fit(pair, &response, config.band_hz)?;
     for _ in 0..MAX_ALIGNMENTS {
-        let FrequencySlopes { equivalent_frequency_hz, delay, .. } = found;
-        let bend = if delay.varies { equivalent_frequency_hz * delay.slope } else { 0.0 };
-        let align_s = delay.value + bend;
-        if config.keep_alignment || (align_s - response.align_s).abs() * pair.rate_hz() < STILL_SAMPLES {
+        let FrequencySlopes { equivalent_frequency_hz, gain, delay, .. } = found;
+        let envelope = if delay.varies { equivalent_frequency_hz * delay.slope } else { 0.0 };
+        let align_s = if config.keep_alignment { response.align_s } else { delay.value + envelope };
+        let dispersion = gain.varies || delay.varies;
+        let still = (align_s - response.align_s).abs() * pair.rate_hz() < STILL_SAMPLES;
+        if still && dispersion == response.dispersion {
             break;
         }
-        response.align_s = align_s;
+        response = ResponseConfig { align_s, dispersion, ..response };
         found = fit(pair, &response, config.band_hz)?;
     }
     Ok(found)
@@ -195,8 +200,9 @@ fn fit(pair: &Pair<'_>, config: &ResponseConfig, band_hz: Option<(f64, f64)>) ->
         band_hz: band,
         n_bins: used.len(),
         align_s: config.align_s,
+        dispersion: config.dispersion,
         n_segments: welch.n_segments,
-        segment_s: welch.segment as f64 / pair.rate_hz(),
+        segment_s: welch.segment_s,
     })
 }
 

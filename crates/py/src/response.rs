@@ -17,17 +17,18 @@ type Curves<'py> = (Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>, 
 /// gain_std, gain_interval, delay_std_s, delay_interval_s
 type Uncertainty<'py> = (Array<'py>, Interval<'py>, Array<'py>, Interval<'py>);
 
-/// segment_s, overlap, window, detrend, align_s
-type Settings<'a> = (Option<f64>, f64, &'a str, &'a str, f64);
+/// segment_s, overlap, window, detrend, align_s, dispersion
+type Settings<'a> = (Option<f64>, f64, &'a str, &'a str, f64, bool);
 
 fn config(py: Python<'_>, settings: Settings<'_>) -> PyResult<ResponseConfig> {
-    let (segment_s, overlap, window, detrend, align_s) = settings;
+    let (segment_s, overlap, window, detrend, align_s, dispersion) = settings;
     Ok(ResponseConfig {
         segment_s,
         overlap,
         window: choice(py, "window", &Window::NAMES, window)?,
         detrend: choice(py, "detrend", &Detrend::NAMES, detrend)?,
         align_s,
+        dispersion,
     })
 }
 
@@ -71,8 +72,8 @@ fn interval(py: Python<'_>, rows: Vec<[f64; 2]>) -> PyResult<Interval<'_>> {
 /// value, std, interval, slope, slope_std, slope_interval, misfit, varies
 type SlopeNumbers = (f64, f64, (f64, f64), f64, f64, (f64, f64), f64, bool);
 
-/// equivalent_frequency_hz, gain, delay, band_hz, n_bins, align_s, n_segments, segment_s
-type SlopesNumbers = (f64, SlopeNumbers, SlopeNumbers, (f64, f64), usize, f64, usize, f64);
+/// equivalent_frequency_hz, gain, delay, band_hz, n_bins, align_s, dispersion, n_segments, segment_s
+type SlopesNumbers = (f64, SlopeNumbers, SlopeNumbers, (f64, f64), usize, f64, bool, usize, f64);
 
 #[pyfunction]
 pub(crate) fn frequency_slopes<'py>(
@@ -99,6 +100,7 @@ pub(crate) fn frequency_slopes<'py>(
         found.band_hz,
         found.n_bins,
         found.align_s,
+        found.dispersion,
         found.n_segments,
         found.segment_s,
     ))
