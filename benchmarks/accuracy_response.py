@@ -114,9 +114,9 @@ def coverage(case: Case, kind: str) -> tuple[Floats, Floats, Floats, Floats]:
 
 def coverage_tables(every_case: list[Case]) -> list[str]:
     lines = [
-        f"Shares of {DRAWS} draws in which the 95 % intervals hold the truth, in percent; noise of {100 * NOISE:g} % of "
-        "measured's standard deviation, white and AR(1) with coefficient 0.9. Listed are the bins whose target density "
-        f"is at least {JUDGED:g} of the highest.",
+        f"Shares of {DRAWS} draws in which the 95 % intervals hold the truth, in percent; noise of {100 * NOISE:g} % "
+        "of measured's standard deviation, white and AR(1) with coefficient 0.9. Listed are the bins whose target "
+        f"density is at least {JUDGED:g} of the highest.",
         "",
     ]
     for case in every_case:
@@ -184,8 +184,8 @@ def slopes_table(every_case: list[Case]) -> list[str]:
     lines = [
         "## Slopes",
         "",
-        "`frequency_slopes` on the same pairs without noise, beside the line through the exact curves with the same bins "
-        "and weights, and on a real machine (`examples/data/utfsm_chirp_0A.csv`), whose truth nobody knows.",
+        "`frequency_slopes` on the same pairs without noise, beside the line through the exact curves with the same "
+        "bins and weights, and on a real machine (`examples/data/utfsm_chirp_0A.csv`), whose truth nobody knows.",
         "",
         "| pair | | f_eq, Hz | A | A', 1/Hz | d, ms | d', ms/Hz | gain varies | delay varies |",
         "| --- | --- | ---: | ---: | ---: | ---: | ---: | --- | --- |",
@@ -208,6 +208,7 @@ def slopes_table(every_case: list[Case]) -> list[str]:
         lines.append(found(case.name, s))
         lines.append(row("", "exact", s.equivalent_frequency_hz, exact_line(case, s), []))
     recording = rthstrack.read_recording(ROOT / "examples" / "data" / "utfsm_chirp_0A.csv")
+    assert recording.rate_hz is not None
     target, measured = recording["cmd_mm"].values, recording["meas_mm"].values
     for band in (None, (1.0, 5.0), (5.0, 10.0), (10.0, 15.0)):
         s = rthstrack.frequency_slopes(target, measured, recording.rate_hz, band_hz=band)

@@ -504,7 +504,7 @@ impl Noise {
             return None;
         }
         let t = student_t_975(self.degrees[k]);
-        (t * std <= LINEAR * gain).then_some(Supported { std, t })
+        (t * std < LINEAR * gain).then_some(Supported { std, t })
     }
 }
 

@@ -17,8 +17,9 @@ const ENERGY_SHARE: f64 = 0.99;
 const MIN_BINS: usize = 3;
 /// Bins to either side over which the noise is averaged, for more degrees of freedom.
 const POOLED: usize = 4;
-/// Times that the target is aligned anew; each leaves a share of about the delay over the segment's length.
-const MAX_ALIGNMENTS: usize = 6;
+/// Times that the target is aligned anew; each leaves a share of about the delay over the segment's length, more where drift
+/// rules.
+const MAX_ALIGNMENTS: usize = 20;
 /// Alignment stands still when it moves by less than this many samples.
 const STILL_SAMPLES: f64 = 1e-3;
 /// Changes over the band that count: this share of the gain,
@@ -118,7 +119,11 @@ pub fn frequency_slopes(pair: &Pair<'_>, config: &SlopesConfig) -> Result<Freque
             break;
         }
         response = ResponseConfig { align_s, dispersion, ..response };
-        found = fit(pair, &response, config.band_hz)?;
+        found = match fit(pair, &response, config.band_hz) {
+            // The record has no room for that.
+            Err(Error::Setting { .. }) => break,
+            other => other?,
+        };
     }
     Ok(found)
 }
