@@ -43,6 +43,15 @@ class Moving(TypedDict):
     valid: NDArray[np.bool_]
 
 
+class Uncertainty(TypedDict):
+    """What noise on measured does to an aligned Welch estimate, arrays (n_bins,)."""
+
+    response: Complexes
+    gain_std: Floats
+    delay_std_s: Floats
+    degrees: Floats
+
+
 class Response(TypedDict):
     """Welch's estimate over frequency, arrays (n_bins,)."""
 
@@ -229,6 +238,73 @@ def frequency_response(
         target_psd=S_II[1:],
         measured_psd=S_OO[1:],
     )
+
+
+def shifted_window(name: str, length: int, shift: float) -> Floats:
+    """A sum of cosines at i + shift instead of i, zero outside its ends."""
+    a = {"hann": [0.5, 0.5], "hamming": [0.54, 0.46], "blackman": [0.42, 0.5, 0.08]}[name]
+    x = np.arange(length) + shift
+    w = sum((-1) ** m * a_m * np.cos(2 * math.pi * m * x / (length - 1)) for m, a_m in enumerate(a))
+    return np.asarray(np.where((x >= 0) & (x <= length - 1), w, 0.0))
+
+
+def response_uncertainty(
+    target: ArrayLike,
+    measured: ArrayLike,
+    rate_hz: float,
+    segment: int,
+    overlap: int,
+    window: str = "hann",
+    align_s: float = 0.0,
+) -> Uncertainty:
+    """H1 of aligned segments less their mean, with its standard errors, by matrices over the segments at every bin.
+
+    Measured's segments start round(align_s rate) samples after target's, the window over target is read earlier by the
+    rest. With noise N of covariance S R over the segments, R_ab = sum_t w(t - t_a) w(t - t_b) exp(i w (t_a - t_b)) over
+    sum w^2: H - H_true = u^H N / |I|, E = (1 - u u^H) N.
+    """
+    I = np.asarray(target, dtype=np.float64)
+    O = np.asarray(measured, dtype=np.float64)
+    lag = round(align_s * rate_hz)
+    w_O = window_shape(window, segment)
+    w_I = shifted_window(window, segment, align_s * rate_hz - lag)
+    starts = np.arange(0, len(I) - abs(lag) - segment + 1, segment - overlap)
+    n = 2 ** math.ceil(math.log2(segment))
+
+    def transforms(x: Floats, w: Floats, first: int) -> Complexes:
+        cut = [x[first + s : first + s + segment] for s in starts]
+        return np.array([np.fft.fft(w * (c - c.mean()), n)[1 : n // 2 + 1] for c in cut])
+
+    I_s, O_s = transforms(I, w_I, max(-lag, 0)), transforms(O, w_O, max(lag, 0))
+    shared = np.zeros((len(starts), len(starts)))
+    for a, t_a in enumerate(starts):
+        for b, t_b in enumerate(starts):
+            gap = abs(t_a - t_b)
+            if gap < segment:
+                shared[a, b] = np.sum(w_O[gap:] * w_O[: segment - gap]) / np.sum(w_O**2)
+    found = Uncertainty(
+        response=np.zeros(n // 2, complex),
+        gain_std=np.zeros(n // 2),
+        delay_std_s=np.zeros(n // 2),
+        degrees=np.zeros(n // 2),
+    )
+    for k in range(1, n // 2 + 1):
+        omega = 2 * math.pi * k / n
+        R = shared * np.exp(1j * omega * (starts[:, None] - starts[None, :]))
+        i, o = I_s[:, k - 1], O_s[:, k - 1]
+        norm = np.linalg.norm(i)
+        u = i / norm
+        H = np.vdot(i, o) / norm**2
+        P = np.eye(len(starts)) - np.outer(u, np.conj(u))
+        PR = P @ R
+        E = o - H * i
+        S = np.vdot(E, E).real / np.trace(PR).real
+        std = math.sqrt(S * np.vdot(u, R @ u).real / norm**2 / 2)
+        found["response"][k - 1] = H * np.exp(-1j * omega * lag)
+        found["gain_std"][k - 1] = std
+        found["delay_std_s"][k - 1] = std / abs(H) / (omega * rate_hz)
+        found["degrees"][k - 1] = 2 * np.trace(PR).real ** 2 / np.trace(PR @ PR).real
+    return found
 
 
 def correlation_lag(target: ArrayLike, measured: ArrayLike, rate_hz: float, max_lag_s: float = 0.5) -> float:

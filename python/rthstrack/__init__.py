@@ -24,6 +24,7 @@ from rthstrack.studies import Study, study
 from rthstrack.tracking import (
     Evaluator,
     FrequencyResponse,
+    FrequencySlopes,
     IndexHistories,
     Indices,
     MovingTracking,
@@ -32,6 +33,7 @@ from rthstrack.tracking import (
     evaluate,
     evaluate_moving,
     frequency_response,
+    frequency_slopes,
     index_histories,
     indices,
 )
@@ -58,6 +60,7 @@ __all__ = [
     "FactorChanges",
     "Factors",
     "FrequencyResponse",
+    "FrequencySlopes",
     "GroundMotion",
     "IndexHistories",
     "Indices",
@@ -83,6 +86,7 @@ __all__ = [
     "evaluate",
     "evaluate_moving",
     "frequency_response",
+    "frequency_slopes",
     "index_histories",
     "indices",
     "key_frequencies",

@@ -17,6 +17,7 @@ __all__ = [
     "choose_factors",
     "evaluate_moving",
     "frequency_response",
+    "frequency_slopes",
     "from_matrices",
     "index_histories",
     "indices",
@@ -111,15 +112,29 @@ def evaluate_moving(
     minimum_std_ratio: float,
     settings: Settings,
 ) -> _Readings: ...
+
+_ResponseSettings = tuple[float | None, float, str, str, float, bool]
+
 def frequency_response(
     target: NDArray[Any],
     measured: NDArray[Any],
     rate_hz: float,
-    segment_s: float | None,
-    overlap: float,
-    window: str,
-    detrend: str,
-) -> tuple[tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array], int, float]: ...
+    settings: _ResponseSettings,
+) -> tuple[
+    tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array], tuple[_Array, _Array, _Array, _Array], int, float
+]: ...
+
+_Interval = tuple[float, float]
+_Slope = tuple[float, float, _Interval, float, float, _Interval, float, bool]
+
+def frequency_slopes(
+    target: NDArray[Any],
+    measured: NDArray[Any],
+    rate_hz: float,
+    band_hz: tuple[float, float] | None,
+    keep_alignment: bool,
+    settings: _ResponseSettings,
+) -> tuple[float, _Slope, _Slope, _Interval, int, float, bool, int, float]: ...
 def indices(
     target: NDArray[Any],
     measured: NDArray[Any],

@@ -74,6 +74,13 @@ pub enum Error {
     },
     /// The target has no energy at the bins that are kept.
     NoEnergy,
+    /// Too few frequency bins carry energy and have an interval for a line through them.
+    FewBins {
+        /// The least number of bins.
+        expected: usize,
+        /// Bins left.
+        found: usize,
+    },
     /// The sampling rate is not a positive number.
     Rate {
         /// The rate given.
@@ -185,6 +192,12 @@ impl fmt::Display for Error {
             Error::NoEnergy => {
                 write!(f, "target has no energy at the bins that are kept: widen the band or lower P and Q")
             }
+            Error::FewBins { expected, found } => write!(
+                f,
+                "{found} frequency {} energy and coherence enough for a line over frequency: at least {expected} are needed; \
+                 take longer segments or a wider band",
+                if *found == 1 { "bin has" } else { "bins have" }
+            ),
             Error::Rate { found } => {
                 write!(f, "rate_hz must be a positive finite number, not {found}")
             }

@@ -15,8 +15,9 @@
 //! 7. [`moving`]: the same over moving windows.
 //! 8. [`factors`]: the largest P and Q that a tolerance allows.
 //! 9. [`key_frequencies`]: the few bins that hold most of the weight, evaluated alone.
-//! 10. [`response`]: gain, phase, delay and coherence over frequency.
-//! 11. [`mod@indices`]: the time-domain indices in use beside them.
+//! 10. [`response`]: gain, phase, delay and coherence over frequency, with intervals.
+//! 11. [`slopes`]: the same as two straight lines.
+//! 12. [`mod@indices`]: the time-domain indices in use beside them.
 //!
 //! [`dynamics`] makes such signals: virtual tests of structures with actuators that lag. It and the evaluation do not know
 //! each other.
@@ -40,6 +41,7 @@ pub mod pair;
 mod quantile;
 pub mod reason;
 pub mod response;
+pub mod slopes;
 mod spectrum;
 pub mod tracking;
 pub mod window;
@@ -53,5 +55,6 @@ pub use moving::{MovingConfig, MovingTracking, evaluate_moving};
 pub use pair::Pair;
 pub use reason::Reason;
 pub use response::{FrequencyResponse, ResponseConfig, frequency_response};
+pub use slopes::{FrequencySlopes, Slope, SlopesConfig, frequency_slopes};
 pub use tracking::{Estimator, Evaluator, EvaluatorConfig, EvaluatorState, Noise, Spectra, Tracking};
 pub use window::{Detrend, Window};

@@ -35,43 +35,48 @@ impl Window {
     ///
     /// w_i = sum_m (-1)^m a_m cos(2 pi m i / (n - 1)), i = 0 .. n-1; tukey with alpha = 0.5 (Harris 1978).
     pub fn coefficients(self, n: usize) -> Option<Vec<f64>> {
+        self.shifted(n, 0.0)
+    }
+
+    /// The same at i + `shift` instead of i, zero outside the window's ends; a boxcar has nothing between its steps to shift.
+    pub(crate) fn shifted(self, n: usize, shift: f64) -> Option<Vec<f64>> {
+        if self == Window::Boxcar {
+            return None;
+        }
+        if n == 1 {
+            return Some(vec![1.0]);
+        }
+        let last = (n - 1) as f64;
+        let at = |i: usize| {
+            let x = i as f64 + shift;
+            // The nearer end is the origin, so that both halves are mirror images to the last bit.
+            let x = x.min(last - x);
+            if x < 0.0 { 0.0 } else { self.at_distance(x, last) }
+        };
+        Some((0..n).map(at).collect())
+    }
+
+    /// The coefficient `x` samples from the nearer end of a window whose ends are `last` samples apart.
+    fn at_distance(self, x: f64, last: f64) -> f64 {
         let terms: &[f64] = match self {
-            Window::Boxcar => return None,
+            Window::Boxcar => &[1.0],
             Window::Hann => &[0.5, 0.5],
             Window::Hamming => &[0.54, 0.46],
             Window::Blackman => &[0.42, 0.5, 0.08],
             Window::Flattop => &[0.21557895, 0.41663158, 0.277263158, 0.083578947, 0.006947368],
-            Window::Tukey => return Some(tukey(n)),
+            Window::Tukey => return tukey(x, last),
         };
-        if n == 1 {
-            return Some(vec![1.0]);
-        }
-        let step = 2.0 * PI / (n - 1) as f64;
-        Some(
-            (0..n)
-                .map(|i| {
-                    // The nearer end is the origin, so that both halves are mirror images to the last bit.
-                    let x = step * i.min(n - 1 - i) as f64;
-                    terms.iter().enumerate().rev().fold(0.0, |sum, (m, a)| {
-                        let sign = if m % 2 == 0 { 1.0 } else { -1.0 };
-                        sum + sign * a * (m as f64 * x).cos()
-                    })
-                })
-                .collect(),
-        )
+        let angle = 2.0 * PI / last * x;
+        terms.iter().enumerate().rev().fold(0.0, |sum, (m, a)| {
+            let sign = if m % 2 == 0 { 1.0 } else { -1.0 };
+            sum + sign * a * (m as f64 * angle).cos()
+        })
     }
 }
 
-fn tukey(n: usize) -> Vec<f64> {
+fn tukey(x: f64, last: f64) -> f64 {
     const ALPHA: f64 = 0.5;
-    let last = (n.max(2) - 1) as f64;
-    let width = (ALPHA * last / 2.0).floor() as usize;
-    (0..n)
-        .map(|i| {
-            let i = i.min(n - 1 - i);
-            if i <= width { 0.5 * (1.0 + (PI * (2.0 * i as f64 / ALPHA / last - 1.0)).cos()) } else { 1.0 }
-        })
-        .collect()
+    if x <= ALPHA * last / 2.0 { 0.5 * (1.0 + (PI * (2.0 * x / ALPHA / last - 1.0)).cos()) } else { 1.0 }
 }
 
 /// What is subtracted from the record before the window.

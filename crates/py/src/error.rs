@@ -32,6 +32,7 @@ fn with_message(py: Python<'_>, error: &Error, message: String) -> PyErr {
         | Error::ConstantTarget { .. }
         | Error::Range { .. }
         | Error::NoEnergy
+        | Error::FewBins { .. }
         | Error::TooShortForChebyshev { .. } => SIGNAL_ERROR.import(py, "rthstrack.errors", "SignalError"),
         _ => setting_class(py),
     };

@@ -22,6 +22,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(factors::prior_bounds, m)?)?;
     m.add_function(wrap_pyfunction!(moving::evaluate_moving, m)?)?;
     m.add_function(wrap_pyfunction!(response::frequency_response, m)?)?;
+    m.add_function(wrap_pyfunction!(response::frequency_slopes, m)?)?;
     m.add_function(wrap_pyfunction!(indices::indices, m)?)?;
     m.add_function(wrap_pyfunction!(indices::index_histories, m)?)?;
     dynamics::register(m)?;
