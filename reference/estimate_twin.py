@@ -24,8 +24,10 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 DEGREE = 9  # of the spline: its error at a fiftieth of the rate is about 1e-11 of the amplitude
-STEPS = 50
-SETTLED_S = 1e-13
+STEPS = 1000  # where target is noisy I' is mostly noise and a step goes only a small part of the way
+ALIGNING_STEPS = 100
+SETTLED_S = 1e-12
+LIKELY = 0.98  # of the highest correlation: lower peaks of it are no candidates for another turn
 
 
 class Estimate(NamedTuple):
@@ -158,7 +160,7 @@ def turns(case: Case) -> list[tuple[float, Estimate]]:
     Where the second leaves no more than the first, the target cannot say which turn it is.
     """
     lags, r = correlation(case)
-    peaks = scipy.signal.find_peaks(r, height=0.5 * np.max(r))[0]
+    peaks = scipy.signal.find_peaks(r, height=LIKELY * np.max(r))[0]
     y, found = case.observed(), []
     for lag in {float(lag) for lag in (*lags[peaks], lags[np.argmax(r)])}:
         estimate = least_squares(case, lag)
@@ -207,7 +209,7 @@ def aligned(case: Case, start_s: float | None = None, weight_power: float = 2) -
     """
     tau = least_squares(case, start_s).delay_s if start_s is None else start_s
     share, before = 1.0, math.inf
-    for _ in range(4 * STEPS):
+    for _ in range(ALIGNING_STEPS):
         value, f_eq = fei(case, tau, weight_power)
         d = -math.atan2(value.imag, value.real) / (2 * math.pi * f_eq)
         if abs(d) < SETTLED_S:
