@@ -17,6 +17,7 @@ import os
 import platform
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -104,12 +105,13 @@ class Pair:
 
 @dataclass(frozen=True)
 class Row:
-    """One thing asked for: `met` None where it is only reported."""
+    """One thing asked for: `met` None where it is only reported. `value` is what a test looks at."""
 
     case: str
     asked: str
     measured: str
     met: bool | None = None
+    value: float = np.nan
 
 
 @dataclass
@@ -128,9 +130,9 @@ class Run:
         """Draws of noise a case."""
         return 40 if self.short else 1000
 
-    def asked(self, case: str, asked: str, measured: str, met: bool | None = None) -> None:
+    def asked(self, case: str, asked: str, measured: str, met: bool | None = None, value: float = np.nan) -> None:
         """A row of the first table."""
-        self.rows.append(Row(case, asked, measured, met))
+        self.rows.append(Row(case, asked, measured, None if met is None else bool(met), float(value)))
 
     def say(self, *lines: str) -> None:
         """Lines of the text, an empty one after them."""
@@ -193,6 +195,14 @@ def unit_noise(rng: np.random.Generator, shape: tuple[int, ...], coefficient: fl
     innovation = np.sqrt(1 - coefficient**2)
     white[..., 0] /= innovation
     return np.asarray(scipy.signal.lfilter([innovation], [1.0, -coefficient], white))
+
+
+def moments(draws: Floats) -> tuple[Floats, Floats, Floats]:
+    """Mean, standard deviation and root mean square over the draws that are determined; NaN where there are none."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of columns in which no draw is
+        mean, std = np.nanmean(draws, axis=0), np.nanstd(draws, axis=0, ddof=1)
+        return mean, std, np.sqrt(np.nanmean(draws**2, axis=0))
 
 
 # What is judged -------------------------------------------------------------------------------------------------------
@@ -390,7 +400,7 @@ def noise(run: Run) -> None:
             found = _noisy_estimates(run, pair, share, 100 + 10 * number + int(share == 0.001))
             limits = pair.limits(share * float(np.std(pair.measured)))
             errors = found - np.array([pair.amplitude, pair.delay_s])
-            bias, std = np.nanmean(errors, axis=0), np.nanstd(errors, axis=0, ddof=1)
+            bias, std, _ = moments(errors)
             run.say(f"### {pair.name}, {100 * share:g} %: limit {1e6 * limits[0, 1]:.3g} us, whole record")
             _noise_table(run, errors, bias, std, limits)
             for i, part in enumerate((slice(0, 1), slice(1, None))):
@@ -404,8 +414,8 @@ def noise(run: Run) -> None:
         for j, what in ((1, "delay"), (0, "gain")):
             bias_std, std_limit = worst[i, j]
             case = f"white noise of 1 % and 0.1 %, {where}, `least_squares`, boxcar, {what}"
-            run.asked(f"{case}: bias over sd", "<= 0.1", f"{bias_std:.3f}", bias_std <= 0.1)
-            run.asked(f"{case}: sd over Cramer-Rao", "<= 1.1", f"{std_limit:.3f}", std_limit <= 1.1)
+            run.asked(f"{case}: bias over sd", "<= 0.1", f"{bias_std:.3f}", bias_std <= 0.1, bias_std)
+            run.asked(f"{case}: sd over Cramer-Rao", "<= 1.1", f"{std_limit:.3f}", std_limit <= 1.1, std_limit)
 
 
 def _noisy_estimates(run: Run, pair: Pair, share: float, seed: int) -> Floats:
@@ -434,7 +444,7 @@ def _noise_table(run: Run, errors: Floats, bias: Floats, std: Floats, limits: Fl
     rows = []
     for i, name in enumerate([*OURS, *generic_delay.ESTIMATORS]):
         b, s, limit = bias[i, :, 1], std[i, :, 1], limits[:, 1]
-        rms = np.sqrt(np.nanmean(errors[:, i, :, 1] ** 2, axis=0)) / limit
+        rms = moments(errors[:, i, :, 1])[2] / limit
         some = np.isfinite(s[1:])
         over, ratio = np.abs(b[1:] / s[1:])[some], (s[1:] / limit[1:])[some]
         lost = np.isnan(errors[:, i, 1:, 1])[:, some].mean()
@@ -541,6 +551,7 @@ def coverage(run: Run) -> None:
                             f"whole {whole:.1f} %; windows {np.mean(each):.1f} %, {outside} of {len(each)} outside"
                             f" ({each.min():.1f} to {each.max():.1f} %); {lost:.2g} % without interval",
                             bool(93 <= whole <= 97 and 93 <= np.mean(each) <= 97) if coefficient < 0.99 else None,
+                            float(np.mean(each)),
                         )
                 rows.append(cells)
             parts = ("whole, %", "windows, %", "sd / limit: whole; windows")
@@ -600,13 +611,15 @@ def both_noisy(run: Run) -> None:
         "## Noise on both channels",
         f"{run.draws} draws of white noise on target and measured alike, its standard deviation 5 % of that of"
         " measured; `noise_ratio=1`. Whole records. Mean error and standard deviation of the delay in % of the delay."
-        " Above 20 Hz there is only noise: a band keeps it out.",
+        " Above 20 Hz there is only noise: a band keeps it out. Taken as exact, a noisy target draws the delay to"
+        " between two samples, where reading it smooths its noise.",
     )
     settings: dict[str, dict[str, Any]] = {
         "`least_squares`, `noise_ratio=1`": {"estimator": "least_squares", "noise_ratio": 1.0},
         "the same, 0.1 to 20 Hz": {"estimator": "least_squares", "noise_ratio": 1.0, "band_hz": (0.1, 20.0)},
         "`least_squares`, target taken as exact": {"estimator": "least_squares"},
         "exact, 0.1 to 20 Hz": {"estimator": "least_squares", "band_hz": (0.1, 20.0)},
+        "`aligned`": {"estimator": "aligned"},
         "`fei`": {"estimator": "fei"},
         "`fei`, 0.1 to 20 Hz": {"estimator": "fei", "band_hz": (0.1, 20.0)},
     }
@@ -614,7 +627,7 @@ def both_noisy(run: Run) -> None:
     for number, pair in enumerate(pairs[:1] if run.short else pairs):
         found = _both_noisy_estimates(run, pair, list(settings.values()), 300 + number)
         errors = found / np.array([pair.amplitude, pair.delay_s]) - 1
-        mean, std = np.nanmean(errors, axis=0), np.nanstd(errors, axis=0, ddof=1)
+        mean, std, _ = moments(errors)
         lost = 100 * np.isnan(errors[:, :, 1]).mean(axis=0)
         run.say(f"### {pair.name}")
         run.table(
@@ -638,6 +651,7 @@ def both_noisy(run: Run) -> None:
                 "<= 0.1",
                 f"{over:.3f} (sd {100 * std[i, 1]:.2g} % of the delay, {lost[i]:.2g} % not determined)",
                 bool(over <= 0.1 and lost[i] == 0),
+                over,
             )
 
 
@@ -768,7 +782,7 @@ def machine_records() -> Iterator[tuple[str, Floats, Floats, float]]:
     yield "utfsm_chirp_0A", np.ascontiguousarray(columns[:, 1]), np.ascontiguousarray(columns[:, 2]), 1000.0
     other = SHARED / "records" / "utfsm_15Hz_0A.txt"
     if other.is_file():
-        channels = {c.name: np.asarray(c.samples) for c in rthstrack.read_recording(other).channels}
+        channels = {c.name: np.array(c.values) for c in rthstrack.read_recording(other).channels}
         yield "utfsm_15Hz_0A", channels["CHANNEL2"], channels["CHANNEL0"], 1000.0
 
 

@@ -229,8 +229,8 @@ def total_least_squares(
     """Gain and delay where target is measured too, its white noise `noise_ratio` times as strong as measured's.
 
     Least of J = |O - K I_tau|^2 / (1 + (K ratio)^2 g(tau)): the residual over its own variance (Deming 1943, with a
-    delay). g is what reading between samples leaves of white noise, the sum of the squared weights of the samples. It
-    is below 1 between samples: without it the least residual would be drawn there. For each tau, K in closed form:
+    delay). g is what reading between samples leaves of white noise in the band. It is below 1 between samples:
+    without it the least residual would be drawn there. For each tau, K in closed form:
     with a = O.O, b = O.J, c = J.J and r = ratio sqrt(g):  r^2 b K^2 + (c - r^2 a) K - b = 0.
     The noise of both makes hollows a sample wide, so tau is searched on a grid of reach_s around its start.
     """
@@ -239,7 +239,7 @@ def total_least_squares(
 
     def solved(tau: float) -> tuple[float, float]:
         J = case.design(tau)[:, 0]
-        r2 = noise_ratio**2 * noise_passed(tau * case.target.rate_hz)
+        r2 = noise_ratio**2 * noise_passed(tau * case.target.rate_hz, case.target.rate_hz, case.band_hz)
         a, b, c = y @ y, y @ J, J @ J
         linear = c - r2 * a
         K = 2 * b / (linear + math.sqrt(linear**2 + 4 * r2 * b**2))
@@ -259,14 +259,16 @@ def total_least_squares(
     return Estimate(solved(found.x)[1], float(found.x), bool(found.success and inside))
 
 
-def noise_passed(samples: float) -> float:
-    """Variance of unit white noise after the spline has moved it by this many samples."""
-    reach = 64
+def noise_passed(samples: float, rate_hz: float, band_hz: tuple[float, float] | None = None) -> float:
+    """Variance of unit white noise after the spline has moved it by this many samples, of its part within the band."""
+    reach, n = 64, 2**16
     impulse = np.zeros(2 * reach + 1)
     impulse[reach] = 1.0
     spline = scipy.interpolate.make_interp_spline(np.arange(2 * reach + 1), impulse, k=DEGREE)
-    at = np.arange(2 * reach) + samples % 1.0
-    return float(np.sum(spline(at) ** 2))
+    f = np.fft.rfftfreq(n, 1 / rate_hz)
+    low, high = band_hz or (0.0, math.inf)
+    passed = np.abs(np.fft.rfft(spline(np.arange(2 * reach) + samples % 1.0), n)) ** 2
+    return float(np.mean(passed[(f >= low) & (f <= high)]))
 
 
 # What noise does ------------------------------------------------------------------------------------------------------
