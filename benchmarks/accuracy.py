@@ -4,7 +4,7 @@ Writes docs/accuracy.md and its figures. Every row that was asked for stands in 
 met or missed. Truth comes from virtual tests; limits from reference/estimate_twin.py. Noise is drawn from one seeded
 generator a case, so that the tables are the same at every run.
 
-    python benchmarks/accuracy.py [--short] [--twin] [--out FOLDER]
+    python benchmarks/accuracy.py [--short] [--twin] [--draws N] [--only SECTION ...] [--out FOLDER]
 
 --short: few draws and records, for a test. --twin: the estimators of the twin in place of the package's.
 """
@@ -62,6 +62,7 @@ OURS: dict[str, dict[str, Any]] = {
     "`fei`, Hann": {"estimator": "fei", **HANN},
 }
 JUDGED = "`least_squares`"
+DRAWS, SHORT_DRAWS = 1000, 40
 CHUNK = 8  # draws of noise that are in memory at once
 GENERIC_WINDOWS = 3  # windows of a draw that the generic estimators, which are slow, are given
 
@@ -120,15 +121,11 @@ class Run:
 
     tool: Any
     short: bool
+    draws: int
     out: Path
     pool: ThreadPoolExecutor
     rows: list[Row] = field(default_factory=list)
     lines: list[str] = field(default_factory=list)
-
-    @property
-    def draws(self) -> int:
-        """Draws of noise a case."""
-        return 40 if self.short else 1000
 
     def asked(self, case: str, asked: str, measured: str, met: bool | None = None, value: float = np.nan) -> None:
         """A row of the first table."""
@@ -842,10 +839,17 @@ SECTIONS: tuple[Callable[[Run], None], ...] = (
 SIBLINGS = ("accuracy_factors", "accuracy_response")
 
 
-def computed(tool: Any, out: Path, short: bool, sections: Sequence[Callable[[Run], None]] = SECTIONS) -> Run:
-    """All sections, with `tool.evaluate` and `tool.evaluate_moving` under test."""
+def computed(
+    tool: Any,
+    out: Path,
+    short: bool,
+    draws: int | None = None,
+    sections: Sequence[Callable[[Run], None]] = SECTIONS,
+) -> Run:
+    """All sections, with `tool.evaluate` and `tool.evaluate_moving` under test and so many draws of noise a case."""
+    draws = draws or (SHORT_DRAWS if short else DRAWS)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        run = Run(tool, short, out, pool)
+        run = Run(tool, short, draws, out, pool)
         for section in sections:
             begun = time.perf_counter()
             section(run)
@@ -889,13 +893,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Writes docs/accuracy.md and its figures.")
     parser.add_argument("--short", action="store_true", help="few draws and records")
     parser.add_argument("--twin", action="store_true", help="the twin's estimators in place of the package's")
+    parser.add_argument("--draws", type=int, help=f"draws of noise a case, {DRAWS} if not given")
     parser.add_argument("--out", type=Path, default=ROOT / "docs", help="folder to write to")
     parser.add_argument("--only", nargs="*", help="names of the sections to compute")
     arguments = parser.parse_args()
     tool: Any = importlib.import_module("twin_tool") if arguments.twin else rthstrack
     arguments.out.mkdir(parents=True, exist_ok=True)
     chosen = [s for s in SECTIONS if not arguments.only or s.__name__ in arguments.only]
-    run = computed(tool, arguments.out, arguments.short, chosen)
+    run = computed(tool, arguments.out, arguments.short, arguments.draws, chosen)
     text = document(run, [] if arguments.short or arguments.only else siblings())
     (arguments.out / "accuracy.md").write_text(text, encoding="utf-8")
     print(text)

@@ -161,10 +161,12 @@ def turns(case: Case) -> list[tuple[float, Estimate]]:
     """
     lags, r = correlation(case)
     peaks = scipy.signal.find_peaks(r, height=LIKELY * np.max(r))[0]
-    y, found = case.observed(), []
-    for lag in {float(lag) for lag in (*lags[peaks], lags[np.argmax(r)])}:
-        estimate = least_squares(case, lag)
-        if estimate.settled:
+    y = case.observed()
+    found: list[tuple[float, Estimate]] = []
+    for lag in (*lags[peaks], lags[np.argmax(r)]):
+        estimate = least_squares(case, float(lag))
+        # Noise makes several peaks of one turn.
+        if estimate.settled and all(abs(estimate.delay_s - e.delay_s) > 1 / case.target.rate_hz for _, e in found):
             left = y - estimate.amplitude * case.design(estimate.delay_s)[:, 0]
             found.append((float(left @ left / (y @ y)), estimate))
     return sorted(found)
