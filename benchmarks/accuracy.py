@@ -243,7 +243,7 @@ def whole_records(run: Run) -> None:
         run.say(
             f"{pair.name}: gain {pair.amplitude:g}, delay {1e6 * pair.delay_s:g} us. Errors of delay, us, and gain."
         )
-        rows, worst = [], np.zeros(2)
+        rows = []
         for window in WINDOWS:
             cells = [window]
             for estimator in ("least_squares", "aligned", "fei"):
@@ -252,8 +252,6 @@ def whole_records(run: Run) -> None:
                 )
                 gain, delay = found[0] - pair.amplitude, 1e6 * (found[3] - pair.delay_s)
                 cells += [f"{delay:.3g}", f"{gain:.2g}"]
-                if estimator != "fei":
-                    worst = np.fmax(worst, [np.inf if np.isnan(x) else abs(x) for x in (delay, gain)])
             rows.append(cells)
         names = ("`least_squares`", "gain", "`aligned`", "gain", "`fei`", "gain")
         run.table(["window", *names], rows)
@@ -262,9 +260,17 @@ def whole_records(run: Run) -> None:
             for name, estimator in generic_delay.ESTIMATORS.items()
         ]
         run.table(["generic estimator", "error of delay, us"], generic)
-        case = f"{pair.name}, whole, any window, no noise"
-        run.asked(f"{case}: delay error", "<= 0.5 us", f"{worst[0]:.2g} us", worst[0] <= 0.5)
-        run.asked(f"{case}: gain error", "<= 1e-5", f"{worst[1]:.2g}", worst[1] <= 1e-5)
+        _asked_of_wholes(run, pair.name, whole_errors(run, pair))
+
+
+def whole_errors(run: Run, pair: Pair) -> Floats:
+    """Largest error of delay, us, and of gain over every window function, `least_squares` and `aligned`, (2,)."""
+    settings = [{"estimator": e, "window": w} for e in ("least_squares", "aligned") for w in WINDOWS]
+    found = np.array(
+        list(run.pool.map(lambda one: run.evaluate(pair.target, pair.measured, pair.rate_hz, one), settings))
+    )
+    errors = np.abs(np.column_stack([1e6 * (found[:, 3] - pair.delay_s), found[:, 0] - pair.amplitude]))
+    return np.asarray(np.max(np.where(np.isnan(errors), np.inf, errors), axis=0))
 
 
 def window_errors(run: Run, pair: Pair, generic: bool = True) -> tuple[Floats, dict[str, Floats]]:
@@ -315,6 +321,12 @@ def _window_table(run: Run, errors: dict[str, Floats], where: Sequence[str]) -> 
     return judged
 
 
+def _asked_of_wholes(run: Run, name: str, worst: Floats) -> None:
+    case = f"{name}, whole, any window, no noise"
+    run.asked(f"{case}: delay error", "<= 0.5 us", f"{worst[0]:.2g} us", worst[0] <= 0.5)
+    run.asked(f"{case}: gain error", "<= 1e-5", f"{worst[1]:.2g}", worst[1] <= 1e-5)
+
+
 def _asked_of_windows(run: Run, case: str, judged: Floats) -> None:
     failing, worst, undetermined = judged
     run.asked(
@@ -347,13 +359,17 @@ def short_windows(run: Run) -> None:
     for kind in (LINEAR, BOUC_WEN):
         pooled: dict[str, list[Floats]] = {}
         where: list[str] = []
+        worst = np.zeros(2)
         for number, component in numbers:
-            time_s, errors = window_errors(run, tested(kind, number, component))
+            pair = tested(kind, number, component)
+            worst = np.maximum(worst, whole_errors(run, pair))
+            time_s, errors = window_errors(run, pair)
             where += [f"{known[number, component]}, {t:.1f} s" for t in time_s]
             for name, values in errors.items():
                 pooled.setdefault(name, []).append(values)
         run.say(f"### {kind}, {len(numbers)} records: " + ", ".join(known[n] for n in numbers))
         judged = _window_table(run, {name: np.concatenate(values) for name, values in pooled.items()}, where)
+        _asked_of_wholes(run, f"{kind}, {len(numbers)} far-field records", worst)
         _asked_of_windows(run, f"{kind}, {len(numbers)} far-field records, 4 s windows", judged)
 
 
@@ -368,12 +384,12 @@ def _windows_figure(run: Run, pair: Pair, time_s: Floats, errors: dict[str, Floa
             (JUDGED, plots.VALUE, "least squares"),
         )
         for name, colour, label in shown:
-            ax.semilogy(time_s, 100 * np.maximum(np.abs(errors[name]), 1e-9), ".", ms=3, color=colour, label=label)
+            ax.semilogy(time_s, np.maximum(100 * np.abs(errors[name]), 1e-4), ".", ms=3, color=colour, label=label)
         ax.axhline(1.0, color=plots.MUTED, linewidth=0.6, linestyle=(0, (5, 3)))
         ax.set_xlabel("Centre of the window (s)")
         ax.set_ylabel("Delay error (%)")
         plots._legend(ax, columns=4)
-        run.save(page, "windows", f"Delay error in 4 s windows, {pair.name}; dashed: 1 %")
+        run.save(page, "windows", f"Delay error in 4 s windows, {pair.name}, at least 1e-4 %; dashed: 1 %")
 
 
 # Noise on measured ----------------------------------------------------------------------------------------------------
@@ -483,7 +499,8 @@ def _noise_figure(run: Run, pair: Pair, errors: Floats, limit: float) -> None:
         page = Figure(figsize=(plots.DOUBLE_COLUMN_IN, 2.8), layout="constrained")
         ax = page.add_subplot()
         colours = [plots.VALUE] * len(OURS) + [plots.DOUBTFUL] * len(generic_delay.ESTIMATORS)
-        ax.barh(range(len(names)), rms, color=colours, height=0.7)
+        ax.hlines(range(len(names)), 1e6 * limit, rms, color=colours, linewidth=0.8)
+        ax.scatter(rms, range(len(names)), color=colours, s=14)
         ax.set_yticks(range(len(names)), [name.replace("`", "") for name in names])
         ax.invert_yaxis()
         ax.set_xscale("log")
@@ -761,13 +778,12 @@ def _delays_figure(run: Run, delays: Floats, curves: dict[tuple[str, str], Float
         axes = page.subplots(1, 2, sharey=True)
         for ax, kind in zip(axes, dict.fromkeys(kind for kind, _ in curves), strict=True):
             for name, colour in (("`fei`", plots.MEASURED), ("`aligned`", plots.SECOND), (JUDGED, plots.VALUE)):
-                size = 1e6 * np.maximum(np.abs(curves[kind, name][:, 1]), 1e-13)
+                size = np.maximum(1e6 * np.abs(curves[kind, name][:, 1]), 1e-3)
                 ax.semilogy(1e3 * delays, size, ".-", color=colour, ms=3, label=name.strip("`"))
-            ax.set_title(kind, loc="left")
-            ax.set_xlabel("Delay (ms)")
+            ax.set_xlabel(f"Delay (ms), {kind}")
         axes[0].set_ylabel("Delay error (µs)")
         plots._legend(axes[1], columns=3)
-        run.save(page, "delays", "Delay error over the delay, whole records")
+        run.save(page, "delays", "Delay error over the delay, whole records, at least 1e-3 us")
 
 
 # A real machine -------------------------------------------------------------------------------------------------------
