@@ -105,6 +105,10 @@ test-peers: $(PEERS)/ready .venv/built ## virtual tests beside OpenSees; downloa
 bench: .venv/built ## benchmark beside SciPy; writes docs/benchmarks.md
 	@$(BIN)/python benchmarks/bench.py
 
+.PHONY: accuracy
+accuracy: .venv/built ## gain and delay beside the truth, and their intervals; writes docs/accuracy.md and figures
+	@$(BIN)/python benchmarks/accuracy.py
+
 .PHONY: docs
 docs: .venv/ready toolchain ## documentation of the Rust core, in target/doc
 	@RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
