@@ -131,7 +131,13 @@ def choose_factors(
         allowed,
         dataclasses.replace(base, data_decimation=chosen_p, frequency_decimation=chosen_q),
         Tracking(
-            *numbers, int(changes.n_bins[0]), plan.delta_f_hz * reference.frequency_decimation, rate, len(t), reference
+            *numbers[0],
+            int(changes.n_bins[0]),
+            plan.delta_f_hz * reference.frequency_decimation,
+            rate,
+            len(t),
+            reference,
+            *numbers[1],
         ),
         changes,
     )
@@ -184,8 +190,9 @@ class KeyFrequencies(_Result):
         t, m = _single(target, measured)
         if len(t) != self.n_samples:
             raise SignalError(f"these key frequencies are planned for {self.n_samples} samples, not for {len(t)}")
-        numbers = self._plan.evaluate(t, m)
-        return Tracking(*numbers, self.frequency_hz.size, self.delta_f_hz, self.rate_hz, self.n_samples, self.settings)
+        averaged, precision = self._plan.evaluate(t, m)
+        bins = (self.frequency_hz.size, self.delta_f_hz)
+        return Tracking(*averaged, *bins, self.rate_hz, self.n_samples, self.settings, *precision)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain Python values: numbers, strings, lists, dicts."""

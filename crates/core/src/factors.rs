@@ -188,6 +188,7 @@ fn changes(reference: &Tracking, found: &Tracking, measure: DelayMeasure, allowa
 }
 
 fn check_plan(settings: &EvaluatorConfig) -> Result<()> {
+    settings.estimator.must_be_published("P and Q that are given, not chosen")?;
     if settings.decimator != Decimator::Spectral {
         return Err(Error::FactorsNeedSpectral);
     }

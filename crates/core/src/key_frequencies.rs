@@ -78,6 +78,7 @@ impl KeyFrequencies {
         if !(share > 0.0 && share <= 1.0) {
             return Err(Error::Setting { name: "share", expected: "above 0 and at most 1".to_owned(), found: share });
         }
+        settings.estimator.must_be_published("all frequencies, not key frequencies")?;
         if settings.decimator != Decimator::Spectral {
             return Err(Error::KeyFrequenciesNeedSpectral);
         }

@@ -33,6 +33,18 @@ impl Estimator {
     /// All choices with their names.
     pub const NAMES: [(&'static str, Estimator); 3] =
         [("fei", Estimator::Fei), ("aligned", Estimator::Aligned), ("least_squares", Estimator::LeastSquares)];
+
+    fn name(self) -> &'static str {
+        Self::NAMES.iter().find(|(_, e)| *e == self).map_or("", |(name, _)| name)
+    }
+
+    /// For what is made of the sums of Eq 12 themselves; others need `needed`.
+    pub(crate) fn must_be_published(self, needed: &str) -> Result<()> {
+        if self == Estimator::Fei {
+            return Ok(());
+        }
+        Err(Error::Combination { name: "estimator", value: self.name().to_owned(), needed: needed.to_owned() })
+    }
 }
 
 /// What least squares takes the noise on measured for.
