@@ -122,10 +122,10 @@ def coverage_tables(every_case: list[Case]) -> list[str]:
         for c, d in zip(every_case[:2], (0.001, 0.005), strict=True)
     ]
     lines = [
-        f"Shares of {DRAWS} draws in which the 95 % intervals hold the truth, in percent; noise of {100 * NOISE:g} % of "
-        "measured's standard deviation, white and AR(1) with coefficient 0.9. Listed are the bins whose target density "
-        f"is at least {JUDGED:g} of the highest. Unless said, each draw is aligned at what `frequency_slopes` finds in "
-        "it; the intervals do not know the noise of that, nor of the correction for dispersion.",
+        f"Shares of {DRAWS} draws in which the 95 % intervals hold the truth, in percent; noise of {100 * NOISE:g} % "
+        "of measured's standard deviation, white and AR(1) with coefficient 0.9. Listed are the bins whose target "
+        f"density is at least {JUDGED:g} of the highest. Unless said, each draw is aligned at what `frequency_slopes` "
+        "finds in it; the intervals do not know the noise of that, nor of the correction for dispersion.",
         "",
     ]
     for case in [*known, *every_case]:
