@@ -36,8 +36,8 @@ const LAST_STEP: f64 = 1e-4;
 const LAST_SECANT_STEP: f64 = 1e-2;
 /// Fewest samples that are judged.
 const MIN_SUPPORT: usize = 16;
-/// Fewest cycles of the target in the window.
-const MIN_CYCLES: f64 = 0.5;
+/// Fewest cycles of the target in the window: more than half a wave, whose delay cannot be told from an offset.
+const MIN_CYCLES: f64 = 0.6;
 /// Least share of measured that must follow the target.
 const MIN_GOODNESS: f64 = 0.1;
 /// Two delays fit equally well if the likelihood of one is below exp(10) times that of the other.
@@ -50,8 +50,8 @@ const LOW_HZ: f64 = 32.0;
 const SHORTENING: usize = 8;
 /// and where the target's velocity has at most this share of its energy above.
 const HIGH_SHARE: f64 = 0.05;
-/// A residual of this share of measured is as good as none: that of interpolation and round-off.
-const EXACT: f64 = 1e-14;
+/// A residual of this share of measured is as good as none: that of interpolation, of the last step and of round-off.
+const EXACT: f64 = 1e-12;
 
 /// The checked plan for windows of one length.
 pub(crate) struct Alignment {
@@ -410,7 +410,9 @@ impl Alignment {
         let support = around(lags().fold(f64::INFINITY, f64::min), lags().fold(f64::NEG_INFINITY, f64::max));
         let mut fits: [Option<Fit>; crate::lag::MAX_PEAKS] = [None; crate::lag::MAX_PEAKS];
         for (slot, peak) in fits.iter_mut().zip(peaks) {
-            *slot = self.refine(state, view, start, &support, peak.lag, room, in_bins).ok();
+            // Twice, so that no step is left that the residual would show.
+            let found = self.refine(state, view, start, &support, peak.lag, room, in_bins);
+            *slot = found.and_then(|f| self.refine(state, view, start, &support, f.tau, 1.0, in_bins)).ok();
         }
         let Some(best) = fits.iter().flatten().copied().min_by(|a, b| a.residual.total_cmp(&b.residual)) else {
             return Err(Reason::NoConvergence);
@@ -874,7 +876,7 @@ impl Alignment {
         let Precision { gain_std, gain_reach, delay_std, delay_reach, .. } = *precision;
         let (delay_std, delay_reach) = (delay_std / self.rate_hz, delay_reach / self.rate_hz);
         // Wider than half a turn says nothing of the delay.
-        if !(delay_reach * tracking.equivalent_frequency_hz < 0.25) {
+        if delay_reach * tracking.equivalent_frequency_hz >= 0.25 {
             return Tracking::undetermined(Reason::LowCoherence { goodness: tracking.goodness });
         }
         tracking.amplitude_std = gain_std;

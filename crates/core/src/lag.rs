@@ -65,7 +65,7 @@ pub(crate) struct Peaks {
     pub(crate) lowest: f64,
     /// Samples from one lag looked at to the next.
     pub(crate) step: usize,
-    /// Cycles that the target moves through in the window, a straight line taken out: its velocity over its displacement.
+    /// Cycles that the target moves through in the window.
     pub(crate) cycles: f64,
 }
 
@@ -148,9 +148,9 @@ impl Search {
         sums::block_means(asked, step, &mut target[..n_target]);
         sums::block_means(answered, step, &mut measured[..n]);
         let reach = self.reach / step;
+        let cycles = cycles(&target[reach..reach + n]);
         take_line(&mut target[..n_target], reach..reach + n);
         take_line(&mut measured[..n], 0..n);
-        let cycles = cycles(&target[reach..reach + n]);
         let at = liveliest(&target[reach..reach + n]);
         let n = n.min(MAX_STRETCH);
         let (target, measured) = (&target[at..at + n + 2 * reach], &mut measured[at..at + n]);
@@ -224,11 +224,13 @@ fn take_line(samples: &mut [f64], own: std::ops::Range<usize>) {
     }
 }
 
-/// Cycles of a motion in its samples, by its rms velocity over its rms displacement.
+/// Cycles of a motion in its samples, by its rms acceleration over its rms velocity: a drift adds nothing, half a wave has 0.55.
 fn cycles(samples: &[f64]) -> f64 {
-    let squares = sums::energy(samples);
-    let steps: f64 = samples.windows(2).map(|w| (w[1] - w[0]) * (w[1] - w[0])).sum();
-    if squares > 0.0 { samples.len() as f64 * (steps / squares).sqrt() / (2.0 * std::f64::consts::PI) } else { 0.0 }
+    let velocity = sums::step_energy(samples);
+    let bend = |w: &[f64]| w[2] - 2.0 * w[1] + w[0];
+    let acceleration: f64 = samples.windows(3).map(|w| bend(w) * bend(w)).sum();
+    let n = samples.len() as f64;
+    if velocity > 0.0 { n * (acceleration / velocity).sqrt() / (2.0 * std::f64::consts::PI) } else { 0.0 }
 }
 
 /// Where the [`MAX_STRETCH`] samples of most energy start.

@@ -11,6 +11,8 @@ use num_complex::Complex;
 
 /// Highest order of the autoregression.
 pub(crate) const MAX_ORDER: usize = 4;
+/// Least of |A|^2 over its mean: no noise spectrum rises higher above the rest.
+const FLATTEST: f64 = 1e-8;
 /// Independent bins in which the residual is compared with the target: within them gain and delay are one number.
 const FINE: f64 = 8.0;
 /// Independent bins from which a spectrum can be estimated at all.
@@ -203,6 +205,7 @@ impl<'a> Spread<'a> {
     /// The bin at zero frequency, which stands for half a pair of bins.
     pub(crate) fn zero_frequency(&mut self, y: f64, velocity: f64, residual: f64) {
         let whitening = self.whitening[0] + 2.0 * self.whitening[1..].iter().sum::<f64>();
+        let whitening = whitening.max(FLATTEST * self.whitening[0]);
         let Influence { gain, delay, leverage } = self.influence;
         let cell = &mut self.cells[0];
         cell.n += 0.5;
@@ -311,6 +314,8 @@ impl Sink for Spread<'_> {
                 whitening[i] += 2.0 * self.whitening[l] * now;
                 (before, now) = (now, 2.0 * c * now - before);
             }
+            // A tone in the residual would make this zero.
+            whitening[i] = whitening[i].max(FLATTEST * self.whitening[0]);
             if let Some(correction) = self.correction {
                 squared[i] = correction[at + i] * correction[at + i];
             }
