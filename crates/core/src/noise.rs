@@ -39,7 +39,7 @@ impl Autoregression {
         for order in 1..=MAX_ORDER.min(samples.len() / 8) {
             let cross: f64 = (0..order).map(|i| now.coefficients[i] * r[order - i]).sum();
             let reflection = -cross / variance;
-            if !(reflection.abs() < 1.0) {
+            if reflection.is_nan() || reflection.abs() >= 1.0 {
                 break;
             }
             let previous = now.coefficients;
