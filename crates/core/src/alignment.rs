@@ -64,6 +64,8 @@ pub(crate) struct Alignment {
     weight_power: u32,
     detrend: Detrend,
     window: Option<Vec<f64>>,
+    /// sum w^2 and sum w^4 of it.
+    moments: (f64, f64),
     search: Search,
     kept: Grid,
     /// Lower bins only, for the precision of what is estimated from all of them while the target moves slowly.
@@ -206,6 +208,7 @@ impl Alignment {
         };
         let undecimated = data_decimation == 1 && frequency_decimation == 1 && band_hz.is_none();
         let exact_target = config.noise_ratio == 0.0;
+        let window = config.window.coefficients(n_samples);
         let low = 1usize << (rate_hz / (2.0 * LOW_HZ)).max(1.0).log2() as u32;
         let low = (undecimated && exact_target && low >= SHORTENING && n_samples >= 2 * low * low)
             .then(|| Grid::low(plan, low));
@@ -218,7 +221,8 @@ impl Alignment {
             noise_ratio: config.noise_ratio,
             weight_power: config.weight_power,
             detrend: config.detrend,
-            window: config.window.coefficients(n_samples),
+            moments: window.as_deref().map_or((0.0, 0.0), moments),
+            window,
             search: Search::new(n_samples, config.max_delay_s * rate_hz),
             kept: Grid::new(plan)?,
             low: low.transpose()?,
@@ -670,7 +674,8 @@ impl Alignment {
     fn window_moments(&self, within: &Range<usize>) -> (f64, f64) {
         match &self.window {
             None => (within.len() as f64, within.len() as f64),
-            Some(w) => (sums::energy(&w[within.clone()]), sums::fourths(&w[within.clone()])),
+            Some(_) if within.len() == self.n_samples => self.moments,
+            Some(window) => moments(&window[within.clone()]),
         }
     }
 
@@ -951,6 +956,11 @@ impl Weighting {
         }
         self.correlation = sums.map(|s| s / sums[0]);
     }
+}
+
+/// sum w^2 and sum w^4
+fn moments(window: &[f64]) -> (f64, f64) {
+    (sums::energy(window), sums::fourths(window))
 }
 
 /// Zeroes what lies outside `within`.
