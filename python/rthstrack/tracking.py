@@ -19,7 +19,7 @@ from rthstrack import _core
 from rthstrack.errors import RthstrackError, SettingError, SignalError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     import pandas as pd
     from numpy.typing import ArrayLike, NDArray
@@ -187,10 +187,10 @@ class Tracking(_Result):
     """Amplitude and delay of measured over target for one record (Eqs 6-12, or by alignment).
 
     Scalars for one pair, arrays of shape (n_actuators,) for several; intervals are (low, high), or (n_actuators, 2).
-    `amplitude_std`, `amplitude_interval`, `delay_std_s`, `delay_interval_s`: standard deviation and 95 % interval, from the
-    spectrum of what the fit leaves; `residual_coherence`: how far that still follows the target, 0 to 1; `goodness`: the share
-    of measured that one gain and one delay explain. All are NaN for "fei", and where not determined: `reason` says why
-    there is no number, or no interval, and is empty where nothing is missing.
+    `amplitude_std`, `amplitude_interval`, `delay_std_s`, `delay_interval_s`: standard deviation and 95 % interval, from
+    the spectrum of what the fit leaves; `residual_coherence`: how far that still follows the target, 0 to 1;
+    `goodness`: the share of measured that one gain and one delay explain. All are NaN for "fei", and where not
+    determined: `reason` says why there is no number, or no interval, and is empty where nothing is missing.
     With `weights=True` also, per kept bin (n_bins,) or (n_bins, n_actuators): `frequency_hz` (n_bins,), `weights`
     (sum to one), `target_spectrum` and `measured_spectrum` (complex DFT of the windowed, zero-padded signals).
     """
@@ -240,9 +240,9 @@ class Tracking(_Result):
 class MovingTracking(_Result):
     """The same over moving windows: arrays (n_readings,) or (n_readings, n_actuators), intervals with (low, high) last.
 
-    `time_s` is each window's centre, counted from the first sample. Where `valid` is False the window could not be judged,
-    most often for want of energy, and the numbers are NaN; `reason` says why, or why there is no interval, for each reading
-    (a tuple, or a tuple of them, one an actuator).
+    `time_s` is each window's centre, counted from the first sample. Where `valid` is False the window could not be
+    judged, most often for want of energy, and the numbers are NaN; `reason` says why, or why there is no interval, for
+    each reading (a tuple, or a tuple of them, one an actuator).
     """
 
     time_s: NDArray[np.float64]
@@ -473,10 +473,10 @@ def evaluate(
     A = |FEI|,  phi = atan2(Im FEI, Re FEI),  d = -phi / (2 pi f_eq),
     over the bins k = Q, 2Q, ... <= p/P of the transform zero-padded to n = 2^ceil(log2 L) = 2p points.
 
-    estimator: "fei", the above. "least_squares": the A and d that minimise sum (O(t) - A I(t - d))^2, and "aligned": the d at
-    which the FEI of O(t) and I(t - d) has no phase. Both shift the raw target before it is detrended and windowed, so that
-    windows, drift and averaged phases do not bias them, and give 95 % intervals; the samples at the ends for which
-    I(t - d) is not known are left out.
+    estimator: "fei", the above. "least_squares": the A and d that minimise sum (O(t) - A I(t - d))^2, and "aligned":
+    the d at which the FEI of O(t) and I(t - d) has no phase. Both shift the raw target before it is detrended and
+    windowed, so that windows, drift and averaged phases do not bias them, and give 95 % intervals; the samples at the
+    ends for which I(t - d) is not known are left out.
 
     target, measured: (n_samples,) or (n_samples, n_actuators), any one unit; rate_hz: samples a second.
     data_decimation: P, a power of two: keeps frequencies up to rate/(2P); decimator "spectral" keeps exactly the
@@ -485,9 +485,9 @@ def evaluate(
     weight_power: l, 1 to 16. window: boxcar, hann, hamming, blackman, flattop or tukey (alpha 0.5).
     detrend: none, mean or linear. band_hz: lowest and highest frequency kept, both included.
     max_delay_s: "aligned" and "least_squares" look for delays and leads up to this, and a quarter of the record.
-    noise, noise_ratio: of "least_squares" only. noise "coloured": both signals are whitened by an autoregression of what a
-    first fit leaves, and fitted again. noise_ratio: standard deviation of the noise on target over that on measured;
-    above 0, total least squares.
+    noise, noise_ratio: of "least_squares" only. noise "coloured": both signals are whitened by an autoregression of
+    what a first fit leaves, and fitted again. noise_ratio: standard deviation of the noise on target over that on
+    measured; above 0, total least squares.
     weights: also return the kept bins with their weights and spectra.
 
     delay_s > 0: measured lags. Raises SignalError for samples that cannot be judged, SettingError for settings.
@@ -537,25 +537,17 @@ def _tracking(
             spectra = (columns[0][0], *(np.stack(column, axis=1) for column in columns[1:]))
     else:
         numbers = plan.evaluate(target, measured)
-    averaged: Sequence[Any]
-    precision: Sequence[Any]
+    averaged: Any
+    reason: str | tuple[str, ...]
     if target.ndim == 1:
         averaged, (*precision, reason) = numbers[0]
     else:
         averaged = [np.array(v) for v in zip(*(n[0] for n in numbers), strict=True)]
         *found_precision, reasons = zip(*(n[1] for n in numbers), strict=True)
         precision, reason = [np.array(v) for v in found_precision], tuple(reasons)
-    return Tracking(
-        *averaged,
-        plan.n_bins,
-        plan.delta_f_hz,
-        rate_hz,
-        len(target),
-        settings,
-        *precision,
-        reason,
-        *spectra,
-    )
+    about = (plan.n_bins, plan.delta_f_hz, rate_hz, len(target), settings)
+    fields: tuple[Any, ...] = (*averaged, *about, *precision, reason, *spectra)
+    return Tracking(*fields)
 
 
 def _each_actuator(
@@ -597,10 +589,10 @@ def evaluate_moving(
 ) -> MovingTracking:
     """A(t), d(t) and f_eq(t): `evaluate` on windows of window_s, one every hop_s.
 
-    Windows of W = round(window_s rate) samples start at 0, H, 2H, ... with H = round(hop_s rate); each reading of "fei" is
-    that of `evaluate` on the window's samples alone, and speaks for the window's centre (start + (W-1)/2) / rate.
-    "aligned" and "least_squares" take the shifted target's samples outside the window from the record, and where several
-    delays fit a window equally well, the one nearest to the whole record's.
+    Windows of W = round(window_s rate) samples start at 0, H, 2H, ... with H = round(hop_s rate); each reading of "fei"
+    is that of `evaluate` on the window's samples alone, and speaks for the window's centre (start + (W-1)/2) / rate.
+    "aligned" and "least_squares" take the shifted target's samples outside the window from the record, and where
+    several delays fit a window equally well, the one nearest to the whole record's.
     Where the target's standard deviation in the window is below minimum_std_ratio times that of the whole record, or
     nothing is left to judge by, `valid` is False and the numbers are NaN.
 
@@ -622,19 +614,20 @@ def evaluate_moving(
     )._checked()
     rate_hz, window_s, hop_s = _number("rate_hz", rate_hz), _number("window_s", window_s), _number("hop_s", hop_s)
     ratio = _number("minimum_std_ratio", minimum_std_ratio)
-    found = _each_actuator(
-        t, m, lambda x, y: _core.evaluate_moving(x, y, rate_hz, window_s, hop_s, ratio, settings)
-    )
+    found = _each_actuator(t, m, lambda x, y: _core.evaluate_moving(x, y, rate_hz, window_s, hop_s, ratio, settings))
     time_s = found[0][0][0]
+    averaged: Any
+    reasons: Any
     if t.ndim == 1:
-        ((_, *averaged), (*precision, reason)) = found[0]
-        reasons: Any = tuple(reason)
+        (_, *averaged), (*precision, reason) = found[0]
+        reasons = tuple(reason)
     else:
         averaged = [np.stack(column, axis=1) for column in list(zip(*(f[0] for f in found), strict=True))[1:]]
-        *columns, each = zip(*(f[1] for f in found), strict=True)
-        precision = [np.stack(column, axis=1) for column in columns]
+        *found_precision, each = zip(*(f[1] for f in found), strict=True)
+        precision = [np.stack(column, axis=1) for column in found_precision]
         reasons = tuple(tuple(r) for r in each)
-    return MovingTracking(time_s, *averaged, window_s, hop_s, ratio, rate_hz, settings, *precision, reasons)
+    columns = (time_s, *averaged, window_s, hop_s, ratio, rate_hz, settings, *precision, reasons)
+    return MovingTracking(*columns)
 
 
 def frequency_response(
