@@ -335,7 +335,7 @@ def figure(assessment: Assessment) -> Figure:
     with _style():
         page = Figure(figsize=(DOUBLE_COLUMN_IN, 8.2), layout=ConstrainedLayoutEngine(w_pad=0.05, h_pad=0.05))
         # Grids within a grid: columns of one width for all rows would have no room for the labels between them.
-        rows = page.add_gridspec(4, 1, height_ratios=(1.25, 2, 2, 2))
+        rows = page.add_gridspec(4, 1, height_ratios=(1.1, 1.7, 1.7, 2.6))
         enlarged, curves = rows[1].subgridspec(1, 5), rows[3].subgridspec(2, 2)
         first, end = display.strongest_span(assessment.target, assessment.rate_hz)
         strongest = (

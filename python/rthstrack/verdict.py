@@ -51,6 +51,8 @@ _WIDE_RAD = math.pi / 6
 _UNSTEADY, _UNSTEADY_INTERVALS, _STEADY_WINDOWS = 0.1, 3.0, 4
 # Windows one length apart differ by this much less than if they had nothing to do with each other.
 _GRADUAL = 0.5
+# Share of the changes over time that follow the motion's frequency, from which they are left to it.
+_BY_FREQUENCY = 0.5
 
 
 def sentence(tracking: Tracking, target: str = "target", measured: str = "measured") -> str:
@@ -140,13 +142,13 @@ def argument(
     if (missing := _undetermined(trusted)) is not None:
         said = "no number can be trusted here" if _undetermined(tracking) is None else "there is no number to use"
         return f"{said}: {missing}{_ADVICE.get(missing, '')}", None
+    if (unsteady := _unsteady(trusted_moving)) is not None:
+        name, text = unsteady
+        return f"{text}; {_averages(tracking, trusted, name)}", None
     if slopes is not None and slopes.delay_varies:
         return f"{_varying_delay(slopes)}; {_averages(tracking, trusted)}", "delay spread"
     if slopes is not None and slopes.gain_varies:
         return f"{_varying_gain(slopes)}; {_averages(tracking, trusted, 'amplitude')}", None
-    if (unsteady := _unsteady(trusted_moving)) is not None:
-        name, text = unsteady
-        return f"{text}; {_averages(tracking, trusted, name)}", None
     if tracking is trusted:
         interval = "with its interval" if not trusted.reason else f"for which there is {trusted.reason}"
         return f"this is the trusted estimate, {interval}", None
@@ -243,6 +245,10 @@ def _unsteady(moving: MovingTracking | None) -> tuple[str, str] | None:
         pairs = known[apart:] & known[:-apart]
         steps = (values[apart:] - values[:-apart])[pairs]
         if steps.size < _STEADY_WINDOWS or np.mean(steps**2) > _GRADUAL * 2 * np.var(values[known]):
+            continue
+        # Where the motion's frequency changes over time, it is the frequency that tells of the actuator.
+        f_eq = moving.equivalent_frequency_hz[known]
+        if np.std(f_eq) > 0 and np.corrcoef(values[known], f_eq)[0, 1] ** 2 > _BY_FREQUENCY:
             continue
         low, high = (float(end) for end in np.quantile(values[known], (0.1, 0.9)))
         noise = float(np.median(interval[known, 1] - interval[known, 0])) / 2
