@@ -84,5 +84,6 @@ def bouc_wen(shared: Path, **options: Any) -> Assessment:
 
 def without_a_number(assessment: Assessment) -> Assessment:
     """The same with a delay that could not be determined."""
-    tracking = dataclasses.replace(assessment.tracking, delay_s=float("nan"), phase_rad=float("nan"))
+    why = "not determined: the iteration did not settle on a delay"
+    tracking = dataclasses.replace(assessment.tracking, delay_s=float("nan"), phase_rad=float("nan"), reason=why)
     return dataclasses.replace(assessment, tracking=tracking, verdict="no delay can be told")

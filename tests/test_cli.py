@@ -17,8 +17,11 @@ from rthstrack.cli import main
 RATE = 200.0
 KEYS = {
     "file", "actuator", "target", "measured", "unit", "rate_hz", "n_samples", "amplitude", "delay_s", "phase_rad",
-    "equivalent_frequency_hz", "n_bins", "delta_f_hz", "settings", "indices", "warnings",
+    "equivalent_frequency_hz", "n_bins", "delta_f_hz", "settings", "indices", "warnings", "amplitude_std",
+    "amplitude_interval", "delay_std_s", "delay_interval_s", "residual_coherence", "goodness", "reason", "trusted",
+    "slopes", "argument",
 }  # fmt: skip
+TRUSTED = {"estimator", "amplitude", "amplitude_interval", "delay_s", "delay_interval_s", "reason"}
 INDICES = {
     "max_tracking_error", "max_tracking_error_percent", "rms_error", "rms_error_percent", "tracking_indicator", "j1_s",
     "j2_percent", "j3_percent",
@@ -82,6 +85,7 @@ def test_the_json_has_exactly_the_promised_keys(capsys: pytest.CaptureFixture[st
     (result,) = document["results"]
     assert set(result) == KEYS
     assert set(result["indices"]) == INDICES
+    assert set(result["trusted"]) == TRUSTED
     assert (result["target"], result["measured"], result["unit"]) == ("target_1 (mm)", "measured_1 (mm)", "mm")
     assert result["actuator"] == 0
     assert result["amplitude"] == pytest.approx(1.05, rel=1e-4)

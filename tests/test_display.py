@@ -83,9 +83,8 @@ def test_the_frequencies_shown_first_hold_the_weight_and_stay_within_the_bins() 
     frequency = np.arange(1, 1001) * 0.1
     weights = np.zeros(1000)
     weights[19:50] = 1 / 31  # 2 to 5 Hz
-    tracking = Tracking(
-        1.0, 0.0, 0.0, 3.5, 1 + 0j, 1000, 0.1, 200.0, 2000, Settings(), frequency_hz=frequency, weights=weights
-    )
+    numbers = (1.0, 0.0, 0.0, 3.5, 1 + 0j, 1000, 0.1, 200.0, 2000)
+    tracking = Tracking(*numbers, Settings(), frequency_hz=frequency, weights=weights)
     low, high = display.judged_range(tracking) or (0.0, 0.0)
     assert frequency[0] <= low < 2.0
     assert 5.0 < high <= frequency[-1]

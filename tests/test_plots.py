@@ -185,7 +185,7 @@ def test_the_composed_figure_has_every_panel(judged: Assessment) -> None:
     page = plots.figure(judged)
     assert page.get_figwidth() == plots.DOUBLE_COLUMN_IN
     letters = [ax.get_title(loc="left") for ax in page.axes if ax.get_title(loc="left")]
-    assert letters == ["(a)", "(b)", "(c)", "(d)", "(e)", "(f)"]
+    assert letters == ["(a)", "(b)", "(c)", "(d)", "(e)", "(f)", "(g)", "(h)"]
     history, zoomed = page.axes[0], page.axes[1]
     low, high = zoomed.get_xlim()
     assert high - low == pytest.approx(4.0, abs=0.02)

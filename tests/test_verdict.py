@@ -26,11 +26,14 @@ def narrow_noise() -> np.ndarray:
 
 
 def warned(target: np.ndarray, measured: np.ndarray, **options: Any) -> str:
-    return "\n".join(rthstrack.assess(target, measured, RATE, **options).warnings)
+    """All that is said beside the numbers: the argument, and the warnings that it does not say itself."""
+    assessment = rthstrack.assess(target, measured, RATE, **options)
+    return "\n".join((assessment.argument, *assessment.warnings))
 
 
 def test_a_plain_lag_deserves_no_warning() -> None:
-    assert warned(response(), 0.99 * response(0.01), unit="mm", measured_unit="mm") == ""
+    assessment = rthstrack.assess(response(), 0.99 * response(0.01), RATE, unit="mm", measured_unit="mm")
+    assert assessment.warnings == ()
 
 
 @pytest.mark.parametrize(

@@ -17,12 +17,27 @@ from rthstrack import verdict as words
 from rthstrack.display import signal_roles
 from rthstrack.errors import SettingError, SignalError
 from rthstrack.factors import TOLERANCE, Factors, choose_factors
-from rthstrack.tracking import Evaluator, Settings, evaluate_moving, frequency_response, index_histories, indices
+from rthstrack.tracking import (
+    Evaluator,
+    Settings,
+    evaluate_moving,
+    frequency_response,
+    frequency_slopes,
+    index_histories,
+    indices,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from rthstrack.tracking import FrequencyResponse, IndexHistories, Indices, MovingTracking, Tracking
+    from rthstrack.tracking import (
+        FrequencyResponse,
+        FrequencySlopes,
+        IndexHistories,
+        Indices,
+        MovingTracking,
+        Tracking,
+    )
 
 #: Length of a moving window unless told otherwise, in seconds, but never more than a quarter of the record.
 MOVING_S = 4.0
@@ -46,6 +61,9 @@ class Assessment:
     `target` and `measured` are the raw samples, `unit` theirs; `time_s` starts at the recording's own start.
     `settings` holds what was done before the evaluation (cut, fill, resample, scale, rate and where it came from)
     and the evaluation's own settings. `exceeded` names each limit that was exceeded, in one sentence.
+    `tracking`, `moving` are of the estimator asked for; `trusted`, `trusted_moving` of least squares on every sample,
+    the same object where that was asked for. `variants`: where both differ, `tracking` with one setting changed, by
+    what was changed ("detrend", "window", "band", "estimator"). `argument` says in one sentence which to use, and why.
     """
 
     file: str
@@ -61,12 +79,18 @@ class Assessment:
     tracking: Tracking  # evaluated with weights=True: spectra and weights inside
     moving: MovingTracking | None
     moving_note: str | None  # why there is no moving evaluation, when there is none
-    response: FrequencyResponse | None
+    trusted: Tracking
+    trusted_moving: MovingTracking | None  # over the same windows
+    variants: Mapping[str, Tracking]
+    response: FrequencyResponse | None  # aligned at the slopes' delay, or the trusted one
     response_note: str | None
+    slopes: FrequencySlopes | None
+    slopes_note: str | None
     indices: Indices
     histories: IndexHistories
     settings: dict[str, Any]
     verdict: str
+    argument: str
     warnings: tuple[str, ...]
     limits: Limits
     exceeded: tuple[str, ...]
@@ -115,20 +139,36 @@ def assess(
     asked = moving_s is not None or hop_s is not None
     window_s = min(MOVING_S, t.size / rate_hz / 4) if moving_s is None else moving_s
     hop_s = max(window_s / READINGS_PER_WINDOW, 1 / rate_hz) if hop_s is None else hop_s
-    moving, moving_note = None, None
+    trusted_settings = _trusted(for_record)
+    trusted = tracking
+    if tracking.settings != trusted_settings:
+        trusted = Evaluator(t.size, rate_hz, trusted_settings).evaluate(t, m)
+    moving, trusted_moving, moving_note = None, None, None
     try:
-        moving = evaluate_moving(t, m, rate_hz, window_s=window_s, hop_s=hop_s, **dataclasses.asdict(for_windows))
+        moving = _moving(t, m, rate_hz, window_s, hop_s, for_windows)
+        trusted_moving = moving
+        if moving.settings != trusted_settings:
+            trusted_moving = _moving(t, m, rate_hz, window_s, hop_s, trusted_settings)
     except (SettingError, SignalError) as error:
         if asked:
             raise type(error)(f"moving windows of {window_s:g} s: {error}") from None
-        moving_note = f"not determined: {error}"
-    response, response_note = None, None
+        moving, moving_note = None, f"not determined: {error}"
+    slopes, slopes_note = None, None
+    # Where one delay explains measured, segments are aligned at it: bursts and drift would lead the search for another.
+    explained = math.isfinite(float(trusted.delay_interval_s[0]))
     try:
-        response = frequency_response(t, m, rate_hz)
+        slopes = frequency_slopes(
+            t, m, rate_hz, band_hz=for_record.band_hz, align_s=float(trusted.delay_s) if explained else None
+        )
     except (SettingError, SignalError) as error:
-        response_note = f"not determined: {error}"
+        slopes_note = f"not determined: {error}"
+    response, response_note = _response(t, m, rate_hz, slopes, trusted)
+    variants = _variants(t, m, tracking, slopes) if words.differ(tracking, trusted) else {}
     limits = limits or Limits()
     names = (target_name, measured_name)
+    units = (unit, measured_unit or unit)
+    warnings = words.warnings(t, m, tracking, moving, response, units, names)
+    argument, said = words.argument(t, tracking, trusted, trusted_moving, slopes, variants, warnings)
     evaluation = dataclasses.asdict(tracking.settings) | _factor_settings(factors)
     return Assessment(
         file=file,
@@ -144,17 +184,95 @@ def assess(
         tracking=tracking,
         moving=moving,
         moving_note=moving_note,
+        trusted=trusted,
+        trusted_moving=trusted_moving,
+        variants=variants,
         response=response,
         response_note=response_note,
+        slopes=slopes,
+        slopes_note=slopes_note,
         indices=indices(t, m, rate_hz),
         histories=index_histories(t, m, rate_hz),
         settings=evaluation | {"moving_s": window_s, "hop_s": hop_s} | dict(origin or {}),
         verdict=words.sentence(tracking, *signal_roles(part)),
-        warnings=words.warnings(t, m, tracking, moving, response, (unit, measured_unit or unit), names),
+        argument=argument,
+        warnings=tuple(text for name, text in warnings.items() if name != said),
         limits=limits,
         exceeded=words.exceeded(tracking, limits),
         factors=factors,
     )
+
+
+def _trusted(settings: Settings) -> Settings:
+    """Least squares on every sample, with the same window and band; two sensors are never assumed to share a zero."""
+    return dataclasses.replace(
+        settings,
+        estimator="least_squares",
+        data_decimation=1,
+        frequency_decimation=1,
+        decimator="spectral",
+        weight_power=2,
+        detrend="linear" if settings.detrend == "linear" else "mean",
+    )._checked()
+
+
+def _moving(
+    target: NDArray[np.float64],
+    measured: NDArray[np.float64],
+    rate_hz: float,
+    window_s: float,
+    hop_s: float,
+    settings: Settings,
+) -> MovingTracking:
+    return evaluate_moving(target, measured, rate_hz, window_s=window_s, hop_s=hop_s, **dataclasses.asdict(settings))
+
+
+def _response(
+    target: NDArray[np.float64],
+    measured: NDArray[np.float64],
+    rate_hz: float,
+    slopes: FrequencySlopes | None,
+    trusted: Tracking,
+) -> tuple[FrequencyResponse | None, str | None]:
+    """Gain and delay over frequency, segments aligned by what is known of the delay, or why there are none."""
+    if slopes is not None:
+        known_s, dispersion = slopes.align_s, slopes.dispersion
+    else:
+        known_s, dispersion = float(trusted.delay_s), False
+    note = None
+    # A record may be long enough for segments, but not for segments that are moved.
+    for align_s in (known_s, 0.0) if math.isfinite(known_s) else (0.0,):
+        try:
+            return frequency_response(target, measured, rate_hz, align_s=align_s, dispersion=dispersion), None
+        except (SettingError, SignalError) as error:
+            note = f"not determined: {error}"
+    return None, note
+
+
+def _variants(
+    target: NDArray[np.float64],
+    measured: NDArray[np.float64],
+    tracking: Tracking,
+    slopes: FrequencySlopes | None,
+) -> dict[str, Tracking]:
+    """The evaluation with one thing changed, each a suspect where it and the trusted estimate differ."""
+    settings = tracking.settings
+    changes: dict[str, dict[str, Any]] = {
+        "window": {"window": "hann" if settings.window == "boxcar" else "boxcar"},
+        "estimator": {"estimator": "aligned", "data_decimation": 1, "frequency_decimation": 1, "decimator": "spectral"},
+    }
+    if settings.detrend != "linear":
+        changes["detrend"] = {"detrend": "linear"}
+    if slopes is not None:
+        low, high = settings.band_hz or (0.0, math.inf)
+        changes["band"] = {"band_hz": (low, min(high, slopes.band_hz[1]))}
+    found = {}
+    for name, change in changes.items():
+        try:
+            found[name] = Evaluator(target.size, tracking.rate_hz, settings, **change).evaluate(target, measured)
+        except (SettingError, SignalError):
+            continue  # nothing is left to judge by: no suspect
+    return found
 
 
 def _chosen(
@@ -215,6 +333,12 @@ def result_entry(a: Assessment) -> dict[str, Any]:
         "equivalent_frequency_hz": t.equivalent_frequency_hz,
         "n_bins": t.n_bins,
         "delta_f_hz": t.delta_f_hz,
+        **_precision(t),
+        "residual_coherence": t.residual_coherence,
+        "goodness": t.goodness,
+        "reason": words.reason(t),
+        "trusted": _trusted_entry(a.trusted),
+        "slopes": _slopes_entry(a.slopes, a.slopes_note),
         "settings": a.settings,
         "indices": {
             "max_tracking_error": i.max_tracking_error,
@@ -226,9 +350,51 @@ def result_entry(a: Assessment) -> dict[str, Any]:
             "j2_percent": i.j2_percent,
             "j3_percent": i.j3_percent,
         },
+        "argument": a.argument,
         "warnings": [*a.warnings, *a.exceeded],
     }
     return {key: json_ready(value) for key, value in entry.items()}
+
+
+def _precision(t: Tracking) -> dict[str, Any]:
+    return {
+        "amplitude_std": t.amplitude_std,
+        "amplitude_interval": _ends(t.amplitude_interval),
+        "delay_std_s": t.delay_std_s,
+        "delay_interval_s": _ends(t.delay_interval_s),
+    }
+
+
+def _ends(interval: Any) -> list[float] | None:
+    """Lower and upper end; None where there is no interval, rather than two ends that are none."""
+    ends = [float(end) for end in interval]
+    return ends if all(map(math.isfinite, ends)) else None
+
+
+def _trusted_entry(t: Tracking) -> dict[str, Any]:
+    return {
+        "estimator": t.settings.estimator,
+        "amplitude": t.amplitude,
+        "amplitude_interval": _ends(t.amplitude_interval),
+        "delay_s": t.delay_s,
+        "delay_interval_s": _ends(t.delay_interval_s),
+        "reason": words.reason(t),
+    }
+
+
+_SLOPES = (
+    "equivalent_frequency_hz", "gain", "gain_interval", "gain_per_hz", "gain_per_hz_interval", "gain_misfit",
+    "gain_varies", "delay_s", "delay_interval_s", "delay_s_per_hz", "delay_s_per_hz_interval", "delay_misfit_s",
+    "delay_varies", "band_hz",
+)  # fmt: skip
+
+
+def _slopes_entry(slopes: FrequencySlopes | None, note: str | None) -> dict[str, Any]:
+    entry: dict[str, Any] = {name: None if slopes is None else getattr(slopes, name) for name in _SLOPES}
+    for name in _SLOPES:
+        if slopes is not None and "interval" in name:
+            entry[name] = _ends(entry[name])
+    return entry | {"reason": note}
 
 
 def json_ready(value: Any) -> Any:

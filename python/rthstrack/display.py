@@ -6,6 +6,7 @@ Nothing here changes a result; every function only chooses how a result is shown
 from __future__ import annotations
 
 import math
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rthstrack.tracking import Tracking
+    from rthstrack.tracking import MovingTracking, Tracking
 
 #: Gain and delay are drawn grey where the coherence is below this.
 LOW_COHERENCE = 0.8
@@ -55,6 +56,35 @@ def significant(value: float, digits: int = 4) -> str:
         return f"{value:.{max(digits - 1 - power, 0)}f}".replace("-", "\N{MINUS SIGN}")
     mantissa = mantissa.replace("-", "\N{MINUS SIGN}")
     return f"{mantissa}\N{MULTIPLICATION SIGN}10{str(power).translate(_SUPERSCRIPTS)}"
+
+
+def with_interval(value: float, interval: Sequence[float], unit: str = "") -> str:
+    """A number with its interval, "12.0034 ms (12.0012 to 12.0056)", to the second digit of half the interval's width.
+
+    Never more than seven significant digits, and four where there is no interval.
+    """
+    tail = f" {unit}" if unit else ""
+    if not math.isfinite(value):
+        return "not determined"
+    low, high = (float(end) for end in interval)
+    if not math.isfinite(high - low):
+        return f"{value:.4g}{tail}"
+    most = 6 - math.floor(math.log10(abs(value))) if value else 9
+    half = (high - low) / 2
+    wanted = 1 - int(f"{half:.1e}".split("e")[1]) if half > 0 else most
+    places = max(min(wanted, most), 0)
+    return f"{value:.{places}f}{tail} ({low:.{places}f} to {high:.{places}f})"
+
+
+def reasons(moving: MovingTracking) -> list[tuple[int, str]]:
+    """Why windows have no number or no interval: how many of each kind, most frequent first, and the first's words."""
+    kinds: dict[str, tuple[int, str]] = {}
+    for reason in moving.reason:
+        if reason:
+            kind = re.sub(r"-?\d[\d.]*", "", str(reason))
+            count, first = kinds.get(kind, (0, str(reason)))
+            kinds[kind] = (count + 1, first)
+    return sorted(kinds.values(), key=lambda found: -found[0])
 
 
 def fourier_scale(tracking: Tracking) -> float:

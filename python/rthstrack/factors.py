@@ -130,17 +130,23 @@ def choose_factors(
         measure,
         allowed,
         dataclasses.replace(base, data_decimation=chosen_p, frequency_decimation=chosen_q),
-        Tracking(
-            *numbers[0],
+        _tracking(
+            numbers,
             int(changes.n_bins[0]),
             plan.delta_f_hz * reference.frequency_decimation,
             rate,
             len(t),
             reference,
-            *numbers[1],
         ),
         changes,
     )
+
+
+def _tracking(numbers: Any, *about: Any) -> Tracking:
+    """What the core found, averages and precision, around what it was found of."""
+    averaged, precision = numbers
+    fields = (*averaged, *about, *precision)
+    return Tracking(*fields)
 
 
 def prior_bounds(
@@ -190,9 +196,9 @@ class KeyFrequencies(_Result):
         t, m = _single(target, measured)
         if len(t) != self.n_samples:
             raise SignalError(f"these key frequencies are planned for {self.n_samples} samples, not for {len(t)}")
-        averaged, precision = self._plan.evaluate(t, m)
+        numbers = self._plan.evaluate(t, m)
         bins = (self.frequency_hz.size, self.delta_f_hz)
-        return Tracking(*averaged, *bins, self.rate_hz, self.n_samples, self.settings, *precision)
+        return _tracking(numbers, *bins, self.rate_hz, self.n_samples, self.settings)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain Python values: numbers, strings, lists, dicts."""

@@ -8,6 +8,7 @@ window opens. Colours are Okabe and Ito's, as on the report's page.
 from __future__ import annotations
 
 import functools
+import math
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -29,14 +30,20 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from rthstrack.tracking import FrequencyResponse, MovingTracking
+    from rthstrack.tracking import FrequencyResponse, FrequencySlopes, MovingTracking
 
 #: Widths of one and of two columns of a journal, in inches.
 SINGLE_COLUMN_IN = 3.5
 DOUBLE_COLUMN_IN = 7.2
 
+# Published estimates are drawn thin and in THIRD beside the trusted ones, which are VALUE with a band.
 TARGET, MEASURED, ERROR, VALUE = "#000000", "#d55e00", "#0072b2", "#0072b2"
 SECOND, THIRD, LIMIT, DOUBTFUL, MUTED = "#009e73", "#cc79a7", "#d55e00", "#b9c0c7", "#59636e"
+
+#: Opacity of the band of an interval.
+BAND = 0.2
+
+_ESTIMATORS = {"fei": "published", "aligned": "aligned", "least_squares": "least squares"}
 
 _STYLE: Any = {
     "mathtext.fontset": "stixsans",
@@ -192,12 +199,16 @@ def plot_spectra(assessment: Assessment, *, ax: Axes | None = None) -> Axes:
 def plot_frequency_response(
     result: Assessment | FrequencyResponse, *, ax: Sequence[Axes] | NDArray[Any] | None = None
 ) -> Sequence[Axes] | NDArray[Any]:
-    """Gain, delay (ms) and coherence over frequency on three axes; grey where the coherence is low."""
+    """Gain, delay (ms) and coherence over frequency on three axes, with 95 % intervals; grey where coherence is low.
+
+    Two axes in place of three leave the coherence out. An assessment also gives the straight lines over the frequencies
+    that hold the energy (dashed).
+    """
     with _style():
-        ax = _several(ax, 3, 3.8)
+        ax = _several(ax, 2 if np.shape(np.array(ax, dtype=object)) == (2,) else 3, 3.8)
         response = result.response if isinstance(result, Assessment) else result
         limits = result.limits if isinstance(result, Assessment) else Limits()
-        gain_axis, delay_axis, coherence_axis = ax
+        gain_axis, delay_axis = ax[:2]
         if response is None:
             for one in ax:
                 _note(one, (result.response_note if isinstance(result, Assessment) else None) or "not determined")
@@ -209,23 +220,27 @@ def plot_frequency_response(
         low, high = shown or (float(frequency[0]), float(frequency[-1]))
         low = max(low, float(frequency[0]))
         in_view = (frequency >= low) & (frequency <= high)
-        for axis, values, ideal, least in (
-            (gain_axis, response.gain[above_zero], 1.0, 0.02),
-            (delay_axis, response.delay_s[above_zero] * 1e3, 0.0, 0.5),
+        for axis, values, interval, ideal, least in (
+            (gain_axis, response.gain[above_zero], response.gain_interval[above_zero], 1.0, 0.02),
+            (delay_axis, response.delay_s[above_zero] * 1e3, response.delay_interval_s[above_zero] * 1e3, 0.0, 0.5),
         ):
             axis.axhline(ideal, color=MUTED, linewidth=0.5)
+            axis.fill_between(frequency, interval[:, 0], interval[:, 1], color=VALUE, alpha=BAND, linewidth=0)
             axis.semilogx(frequency, values, color=DOUBTFUL)
             axis.semilogx(frequency, np.where(sure, values, np.nan), color=VALUE, linewidth=1)
             relied_on = values[sure & in_view]
             _value_range(axis, relied_on if relied_on.size else values[in_view], ideal, least)
-        coherence_axis.semilogx(frequency, coherence, color=DOUBTFUL)
-        coherence_axis.semilogx(frequency, np.where(sure, coherence, np.nan), color=VALUE, linewidth=1)
-        coherence_axis.axhline(display.LOW_COHERENCE, color=MUTED, linewidth=0.5, linestyle=(0, (1, 2)))
-        coherence_axis.set_ylim(0, 1.05)
+        for coherence_axis in ax[2:]:
+            coherence_axis.semilogx(frequency, coherence, color=DOUBTFUL)
+            coherence_axis.semilogx(frequency, np.where(sure, coherence, np.nan), color=VALUE, linewidth=1)
+            coherence_axis.axhline(display.LOW_COHERENCE, color=MUTED, linewidth=0.5, linestyle=(0, (1, 2)))
+            coherence_axis.set_ylim(0, 1.05)
+            coherence_axis.set_ylabel("Coherence (-)")
+        if isinstance(result, Assessment):
+            _slope_lines(gain_axis, delay_axis, result.slopes)
         _limit_lines(gain_axis, delay_axis, limits)
         gain_axis.set_ylabel("Gain (-)")
         delay_axis.set_ylabel("Delay (ms)")
-        coherence_axis.set_ylabel("Coherence (-)")
         for axis in ax:
             _frequency_axis(axis, low, high)
             if isinstance(result, Assessment):
@@ -237,9 +252,10 @@ def plot_frequency_response(
 def plot_moving(
     result: Assessment | MovingTracking, *, ax: Sequence[Axes] | NDArray[Any] | None = None
 ) -> Sequence[Axes] | NDArray[Any]:
-    """A(t) and d(t) (ms) of moving windows, at their centres, on two axes; gaps where the target moves too little.
+    """A(t) and d(t) (ms) of moving windows, at their centres, on two axes; gaps where nothing could be determined.
 
-    An assessment also gives its limits (dashed) and the whole record's A and d (dotted).
+    An assessment gives the trusted estimate with its 95 % intervals as a band beside the one asked for, its limits
+    (dashed) and the whole record's trusted A and d (dotted).
     """
     with _style():
         ax = _several(ax, 2, 2.8)
@@ -251,19 +267,34 @@ def plot_moving(
                 _note(one, (assessment.moving_note if assessment else None) or "not determined")
             return ax
         time_s = moving.time_s + (assessment.start_s if assessment else 0.0)
-        amplitude = np.where(moving.valid, moving.amplitude, np.nan)
-        delay_ms = np.where(moving.valid, moving.delay_s, np.nan) * 1e3
-        for axis, values, ideal, least in ((amplitude_axis, amplitude, 1.0, 0.02), (delay_axis, delay_ms, 0.0, 0.5)):
+        trusted = assessment.trusted_moving if assessment else moving
+        if trusted is moving:
+            trusted = moving if moving.settings.estimator == "least_squares" else None
+        for axis, name, factor, ideal, least in (
+            (amplitude_axis, "amplitude", 1.0, 1.0, 0.02),
+            (delay_axis, "delay_s", 1e3, 0.0, 0.5),
+        ):
             axis.axhline(ideal, color=MUTED, linewidth=0.5)
-            axis.plot(time_s, values, color=VALUE, linewidth=1)
-            _value_range(axis, values[moving.valid], ideal, least)
+            shown = []
+            if trusted is not moving:
+                values = np.where(moving.valid, getattr(moving, name), np.nan) * factor
+                colour, width = (VALUE, 1.0) if trusted is None else (THIRD, 0.7)
+                axis.plot(time_s, values, color=colour, linewidth=width, label=_ESTIMATORS[moving.settings.estimator])
+                shown.append(values)
+            if trusted is not None:
+                values = np.where(trusted.valid, getattr(trusted, name), np.nan) * factor
+                ends = (trusted.amplitude_interval if name == "amplitude" else trusted.delay_interval_s) * factor
+                axis.fill_between(time_s, ends[:, 0], ends[:, 1], color=VALUE, alpha=BAND, linewidth=0)
+                axis.plot(time_s, values, color=VALUE, linewidth=1, label="trusted")
+                shown.append(values)
+            _value_range(axis, np.concatenate(shown), ideal, least)
+        if assessment is not None and trusted is not None and trusted is not moving:
+            _legend(amplitude_axis, columns=2)
         if assessment is not None:
-            amplitude_axis.axhline(
-                float(assessment.tracking.amplitude), color=VALUE, linewidth=0.6, linestyle=(0, (1, 2))
-            )
-            delay_axis.axhline(
-                float(assessment.tracking.delay_s) * 1e3, color=VALUE, linewidth=0.6, linestyle=(0, (1, 2))
-            )
+            whole = assessment.trusted if math.isfinite(float(assessment.trusted.delay_s)) else assessment.tracking
+            dotted: Any = {"color": VALUE, "linewidth": 0.6, "linestyle": (0, (1, 2))}
+            amplitude_axis.axhline(float(whole.amplitude), **dotted)
+            delay_axis.axhline(float(whole.delay_s) * 1e3, **dotted)
             _limit_lines(amplitude_axis, delay_axis, assessment.limits)
         amplitude_axis.set_ylabel("A (-)")
         delay_axis.set_ylabel("d (ms)")
@@ -300,24 +331,27 @@ def plot_indices(
 
 
 def figure(assessment: Assessment) -> Figure:
-    """One figure, two columns wide: histories, their strongest 4 s and the loop, spectra and weights, A(t) and d(t)."""
+    """One figure, two columns wide: histories, their strongest 4 s, loop, spectra, A and d over time and frequency."""
     with _style():
-        page = Figure(figsize=(DOUBLE_COLUMN_IN, 6.4), layout=ConstrainedLayoutEngine(w_pad=0.05, h_pad=0.05))
-        grid = page.add_gridspec(4, 5, height_ratios=(1.25, 2, 1.0, 1.0))
+        page = Figure(figsize=(DOUBLE_COLUMN_IN, 8.2), layout=ConstrainedLayoutEngine(w_pad=0.05, h_pad=0.05))
+        # Grids within a grid: columns of one width for all rows would have no room for the labels between them.
+        rows = page.add_gridspec(4, 1, height_ratios=(1.1, 1.7, 1.7, 2.6))
+        enlarged, curves = rows[1].subgridspec(1, 5), rows[3].subgridspec(2, 2)
         first, end = display.strongest_span(assessment.target, assessment.rate_hz)
         strongest = (
             assessment.start_s + first / assessment.rate_hz,
             assessment.start_s + (end - 1) / assessment.rate_hz,
         )
-        history = plot_time_history(assessment, ax=page.add_subplot(grid[0, :]))
+        history = plot_time_history(assessment, ax=page.add_subplot(rows[0]))
         history.axvspan(*strongest, color="#000000", alpha=0.08, linewidth=0)
-        zoomed = plot_time_history(assessment, ax=page.add_subplot(grid[1, :3]), span_s=strongest)
-        loop = plot_loop(assessment, ax=page.add_subplot(grid[1, 3:]), span_s=strongest)
-        spectra = plot_spectra(assessment, ax=page.add_subplot(grid[2:, :3]))
-        amplitude = page.add_subplot(grid[2, 3:])
-        delay = page.add_subplot(grid[3, 3:])
-        plot_moving(assessment, ax=(amplitude, delay))
-        for axis, letter in zip((history, zoomed, loop, spectra, amplitude, delay), "abcdef", strict=True):
+        zoomed = plot_time_history(assessment, ax=page.add_subplot(enlarged[:3]), span_s=strongest)
+        loop = plot_loop(assessment, ax=page.add_subplot(enlarged[3:]), span_s=strongest)
+        spectra = plot_spectra(assessment, ax=page.add_subplot(rows[2]))
+        moving = [page.add_subplot(curves[row, 0]) for row in (0, 1)]
+        plot_moving(assessment, ax=moving)
+        response = [page.add_subplot(curves[row, 1]) for row in (0, 1)]
+        plot_frequency_response(assessment, ax=response)
+        for axis, letter in zip((history, zoomed, loop, spectra, *moving, *response), "abcdefgh", strict=True):
             axis.set_title(f"({letter})", loc="left", fontweight="bold", pad=3)
     return page
 
@@ -417,6 +451,19 @@ def _value_range(ax: Axes, values: NDArray[np.float64], ideal: float, least: flo
         low, high = min(low, ideal), max(high, ideal)
     air = 0.08 * (high - low)
     ax.set_ylim(low - air, high + air)
+
+
+def _slope_lines(gain_axis: Axes, delay_axis: Axes, slopes: FrequencySlopes | None) -> None:
+    """Gain and delay as straight lines over frequency, which a logarithmic axis bends."""
+    if slopes is None:
+        return
+    frequency = np.linspace(*slopes.band_hz, 100)
+    away = frequency - slopes.equivalent_frequency_hz
+    for axis, value, slope in (
+        (gain_axis, slopes.gain, slopes.gain_per_hz),
+        (delay_axis, slopes.delay_s * 1e3, slopes.delay_s_per_hz * 1e3),
+    ):
+        axis.plot(frequency, value + slope * away, color=SECOND, linewidth=0.8, linestyle=(0, (5, 3)))
 
 
 def _limit_lines(amplitude_axis: Axes, delay_axis: Axes, limits: Limits) -> None:

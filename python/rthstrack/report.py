@@ -11,7 +11,7 @@ import dataclasses
 import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
 from html import escape
 from importlib import resources
@@ -24,11 +24,13 @@ from rthstrack import display
 from rthstrack._core import __version__
 from rthstrack.assessment import json_ready, result_entry
 from rthstrack.errors import SettingError
+from rthstrack.verdict import reason
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rthstrack.assessment import Assessment
+    from rthstrack.tracking import FrequencySlopes, MovingTracking
 
 #: More samples than this are drawn by their extremes.
 DRAWN_SAMPLES = 200_000
@@ -36,6 +38,8 @@ DRAWN_SAMPLES = 200_000
 DRAWN_POINTS = 6_000
 
 NOT_DETERMINED = "not determined"
+
+_ESTIMATORS = {"fei": "published", "aligned": "aligned", "least_squares": "least squares"}
 
 _INDICES = (
     # name, field, unit, factor to the unit shown, field in percent, what it is
@@ -57,6 +61,9 @@ _SETTING_NAMES = {
     "window": "Window",
     "detrend": "Detrend",
     "band_hz": "Band",
+    "max_delay_s": "Largest delay looked for",
+    "noise": "Noise on measured",
+    "noise_ratio": "Noise on target over that on measured",
     "moving_s": "Moving windows",
     "hop_s": "One moving window every",
     "rate_source": "Rate from",
@@ -159,6 +166,7 @@ def result_record(assessment: Assessment) -> dict[str, Any]:
         "start_s": a.start_s,
         "indices": dataclasses.asdict(a.indices),
         "moving": None,
+        "trusted_moving": None,
         "response": None,
         "verdict": a.verdict,
         "warnings": a.warnings,
@@ -174,8 +182,15 @@ def result_record(assessment: Assessment) -> dict[str, Any]:
             "n_readings": int(a.moving.time_s.size),
             "n_valid": int(np.count_nonzero(a.moving.valid)),
         }
+    if a.trusted_moving is not None:
+        known = a.trusted_moving.valid
+        record["trusted_moving"] = {
+            "n_valid": int(np.count_nonzero(known)),
+            "n_intervals": int(np.count_nonzero(np.isfinite(a.trusted_moving.delay_interval_s[:, 0]))),
+            "reasons": [{"n": n, "first": text} for n, text in display.reasons(a.trusted_moving)],
+        }
     if a.response is not None:
-        names = ("segment_s", "overlap", "n_segments", "window", "detrend")
+        names = ("segment_s", "overlap", "n_segments", "window", "detrend", "align_s", "dispersion")
         record["response"] = {name: getattr(a.response, name) for name in names}
     return {key: json_ready(value) for key, value in record.items()}
 
@@ -187,7 +202,7 @@ def _reasons(a: Assessment) -> dict[str, str]:
     reasons: dict[str, str] = {}
     for name in ("amplitude", "delay_s", "phase_rad", "equivalent_frequency_hz"):
         if not math.isfinite(getattr(a.tracking, name)):
-            reasons[name] = "the evaluation gave no finite number"
+            reasons[name] = _why(reason(a.tracking))
     for index in dataclasses.fields(a.indices):
         value = getattr(a.indices, index.name)
         if value is None:
@@ -195,6 +210,10 @@ def _reasons(a: Assessment) -> dict[str, str]:
             reasons[index.name] = "needs the measured force" if needs_force else "was not evaluated"
         elif not math.isfinite(value):
             reasons[index.name] = "the evaluation gave no finite number"
+    if (text := reason(a.trusted)) is not None:
+        reasons["trusted"] = _why(text)
+    if a.slopes is None:
+        reasons["slopes"] = _why(a.slopes_note)
     if a.moving is None:
         reasons["moving"] = _why(a.moving_note)
     if a.response is None:
@@ -218,6 +237,17 @@ def _number(
     tail = f'<span class="unit">{"" if unit == "°" else " "}{escape(unit)}</span>' if unit else ""
     exact = value if isinstance(value, int) else repr(float(value))
     return f'<data data-field="{field}" value="{exact}">{shown}{tail}</data>'
+
+
+def _interval(field: str, interval: Iterable[float], value: float, unit: str = "", factor: float = 1.0) -> str:
+    """A 95 % interval as text, to the digits that its width leaves; empty where there is none."""
+    low, high = (float(end) for end in interval)
+    if not math.isfinite(high - low):
+        return ""
+    text = display.with_interval(factor * value, (factor * low, factor * high)).partition(" (")[2].rstrip(")")
+    ends = f'data-low="{low!r}" data-high="{high!r}"'
+    shown = escape(text.replace("-", "\N{MINUS SIGN}") + (f" {unit}" if unit else ""))
+    return f'95 %: <span data-field="{field}" {ends}>{shown}</span>'
 
 
 def _flat(settings: Mapping[str, Any], before: str = "") -> list[tuple[str, Any]]:
@@ -280,13 +310,13 @@ class _Blocks:
         self._texts: dict[str, str] = {}
 
     def column(self, values: NDArray[Any]) -> dict[str, Any]:
-        """Store a column. Single precision of the distance from mid-range: 6e-8 of the range, whatever the offset."""
+        """Store a column in single precision, of the distance from mid-range where that is far from zero."""
         if values.dtype.kind in "iu":
             return self._store(values.astype("<u4"), "u4", 0.0)
         finite = values[np.isfinite(values)]
         low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
-        # Only a true offset is worth it: taken off a spectrum it would round the small values away.
-        offset = (low + high) / 2 if high - low < max(abs(low), abs(high)) else 0.0
+        # Only a true offset is worth it: off a spectrum, or a gain with one wild bin, it would round the rest away.
+        offset = (low + high) / 2 if 2 * (high - low) < max(abs(low), abs(high)) else 0.0
         if 1e-30 < high - low < 1e30:
             return self._store((values - offset).astype("<f4"), "f4", offset)
         return self._store(values.astype("<f8"), "f8", 0.0)
@@ -327,6 +357,8 @@ def _drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any]:
         "unit": a.unit or "",
         "amplitude": a.tracking.amplitude,
         "delay_s": a.tracking.delay_s,
+        "trusted_amplitude": a.trusted.amplitude,
+        "trusted_delay_s": a.trusted.delay_s,
         "equivalent_frequency_hz": a.tracking.equivalent_frequency_hz,
         "limits": dataclasses.asdict(a.limits),
         "time": _time_drawing(a, blocks),
@@ -398,8 +430,10 @@ def _moving_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any] | None:
     m = a.moving
     if m is None or m.time_s.size == 0:
         return None
-    amplitude, delay_s = np.where(m.valid, m.amplitude, np.nan), np.where(m.valid, m.delay_s, np.nan)
-    kept = _kept_points([amplitude, delay_s])
+    columns = {"amplitude": np.where(m.valid, m.amplitude, np.nan), "delay_s": np.where(m.valid, m.delay_s, np.nan)}
+    if a.trusted_moving is not None:
+        columns |= _trusted_columns(a.trusted_moving)
+    kept = _kept_points(list(columns.values()))
     edges = np.flatnonzero(np.diff(np.concatenate(([True], m.valid, [True])).astype(np.int8)))
     half = m.hop_s / 2
     invalid = [
@@ -410,10 +444,22 @@ def _moving_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any] | None:
         "n": m.time_s.size,
         "drawn": m.time_s.size if kept is None else kept.size,
         "label": f"windows of {m.window_s:.4g} s",
+        "name": _ESTIMATORS[m.settings.estimator],
+        "both": a.trusted_moving is not a.moving,
         "time": blocks.column(_take(a.start_s + m.time_s, kept)),
-        "amplitude": blocks.column(_take(amplitude, kept)),
-        "delay_s": blocks.column(_take(delay_s, kept)),
+        **{name: blocks.column(_take(column, kept)) for name, column in columns.items()},
         "invalid": invalid,
+    }
+
+
+def _trusted_columns(m: MovingTracking) -> dict[str, NDArray[np.float64]]:
+    return {
+        "trusted_amplitude": np.where(m.valid, m.amplitude, np.nan),
+        "trusted_delay_s": np.where(m.valid, m.delay_s, np.nan),
+        "amplitude_low": m.amplitude_interval[:, 0],
+        "amplitude_high": m.amplitude_interval[:, 1],
+        "delay_low_s": m.delay_interval_s[:, 0],
+        "delay_high_s": m.delay_interval_s[:, 1],
     }
 
 
@@ -441,20 +487,41 @@ def _response_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any] | None:
     if r is None:
         return None
     above_zero = r.frequency_hz > 0
-    frequency, gain, delay_s, coherence = (
-        column[above_zero] for column in (r.frequency_hz, r.gain, r.delay_s, r.coherence)
-    )
+    frequency = r.frequency_hz[above_zero]
     if frequency.size == 0:
         return None
-    kept = _kept_points([gain, delay_s, coherence], logarithmic=True)
+    columns = {
+        name: column[above_zero]
+        for name, column in (
+            ("gain", r.gain),
+            ("delay_s", r.delay_s),
+            ("coherence", r.coherence),
+            ("gain_low", r.gain_interval[:, 0]),
+            ("gain_high", r.gain_interval[:, 1]),
+            ("delay_low_s", r.delay_interval_s[:, 0]),
+            ("delay_high_s", r.delay_interval_s[:, 1]),
+        )
+    }
+    kept = _kept_points(list(columns.values()), logarithmic=True)
     return {
         "n": frequency.size,
         "drawn": frequency.size if kept is None else kept.size,
         "low_coherence": display.LOW_COHERENCE,
+        "line": _slope_lines(a.slopes),
         "frequency": blocks.column(_take(frequency, kept)),
-        "gain": blocks.column(_take(gain, kept)),
-        "delay_s": blocks.column(_take(delay_s, kept)),
-        "coherence": blocks.column(_take(coherence, kept)),
+        **{name: blocks.column(_take(column, kept)) for name, column in columns.items()},
+    }
+
+
+def _slope_lines(s: FrequencySlopes | None) -> dict[str, Any] | None:
+    """The lines of gain and delay over the frequencies that they were fitted to: value + slope (f - at)."""
+    if s is None:
+        return None
+    return {
+        "band": s.band_hz,
+        "at": s.equivalent_frequency_hz,
+        "gain": [s.gain, s.gain_per_hz],
+        "delay_s": [s.delay_s, s.delay_s_per_hz],
     }
 
 
@@ -578,6 +645,7 @@ def _heading(a: Assessment) -> str:
     return (
         f'<p class="facts">{" · ".join(facts)}</p>'
         f'<h2 class="verdict" data-field="verdict">{escape(a.verdict)}</h2>'
+        f'<p class="argument" data-field="argument">{escape(a.argument)}</p>'
         + _notice("exceeded", ("Limit exceeded", "Limits exceeded"), a.exceeded)
     )
 
@@ -592,13 +660,13 @@ def _key_numbers(a: Assessment) -> str:
         (
             "Amplitude A",
             _number("amplitude", amplitude, reason=reasons.get("amplitude")),
-            "1 is perfect",
+            _beside(a, "amplitude") or "1 is perfect",
             _limit("limit_amplitude", "1 \N{PLUS-MINUS SIGN} ", abs(amplitude - 1), a.limits.amplitude),
         ),
         (
             "Delay d",
             _number("delay_s", delay_s, "ms", 1e3, reasons.get("delay_s")),
-            sense if math.isfinite(delay_s) else "",
+            _beside(a, "delay_s") or (sense if math.isfinite(delay_s) else ""),
             _limit("limit_delay_s", "\N{PLUS-MINUS SIGN}", abs(delay_s), a.limits.delay_s, "ms", 1e3),
         ),
         (
@@ -618,6 +686,22 @@ def _key_numbers(a: Assessment) -> str:
         f"<div><dt>{name}</dt><dd>{value}<small>{note}</small>{limit}</dd></div>" for name, value, note, limit in large
     )
     return f'<dl class="tiles">{tiles}</dl>{_index_tiles(a, target_role, measured_role, reasons)}'
+
+
+def _beside(a: Assessment, name: str) -> str:
+    """Which estimate the tile shows, its interval if it has one, and the trusted one with its own."""
+    t = a.trusted
+    unit, factor = ("ms", 1e3) if name == "delay_s" else ("", 1.0)
+    field = "delay_interval_s" if name == "delay_s" else "amplitude_interval"
+    parts = ["as published" if a.tracking.settings.estimator == "fei" else _ESTIMATORS[a.tracking.settings.estimator]]
+    if own := _interval(field, getattr(a.tracking, field), float(getattr(a.tracking, name)), unit, factor):
+        parts.append(own)
+    if t is not a.tracking:
+        value = float(getattr(t, name))
+        parts.append(f"trusted: {_number(f'trusted_{name}', value, unit, factor)}")
+        between = _interval(f"trusted_{field}", getattr(t, field), value, unit, factor)
+        parts.append(between or ("no interval" if math.isfinite(value) else ""))
+    return "<br>".join(part for part in parts if part)
 
 
 def _limit(field: str, sign: str, found: float, limit: float | None, unit: str = "", factor: float = 1.0) -> str:
@@ -681,7 +765,9 @@ def _time_charts(a: Assessment, drawing: Mapping[str, Any]) -> str:
             f"{m.minimum_std_ratio:.3g} of the record's)."
         )
         moving = _chart("moving-amplitude", "Amplitude over time")
-        moving += _chart("moving-delay", "Delay over time", text + _thinned(drawing["moving"], "windows"))
+        moving += _chart(
+            "moving-delay", "Delay over time", text + _trusted_windows(a) + _thinned(drawing["moving"], "windows")
+        )
     histories = drawing["histories"]
     energy = _chart("energy", "Energy error over time") if "energy_error" in histories else ""
     note = _thinned(histories, "samples")
@@ -705,6 +791,23 @@ def _time_charts(a: Assessment, drawing: Mapping[str, Any]) -> str:
     )
 
 
+def _trusted_windows(a: Assessment) -> str:
+    """What the caption says of the trusted estimate: windows with a number and an interval, and why not others."""
+    m = a.trusted_moving
+    if m is None:
+        return ""
+    n_intervals = int(np.count_nonzero(np.isfinite(m.delay_interval_s[:, 0])))
+    text = (
+        f" Trusted (least squares): {int(np.count_nonzero(m.valid))} windows with a number, {n_intervals} of them with "
+        "a 95 % interval, drawn as a band."
+    )
+    counted = display.reasons(m)
+    if not counted:
+        return text
+    items = "".join(f"<li>{n} \N{MULTIPLICATION SIGN} {escape(first)}</li>" for n, first in counted)
+    return f'{text} What is missing, and why, in the words of the first:<ul data-field="moving_reasons">{items}</ul>'
+
+
 def _frequency_charts(a: Assessment, drawing: Mapping[str, Any]) -> str:
     left = right = ""
     if drawing["spectrum"] is not None:
@@ -717,9 +820,10 @@ def _frequency_charts(a: Assessment, drawing: Mapping[str, Any]) -> str:
         r = a.response
         text = (
             f"Welch's method: {r.n_segments} segments of {r.segment_s:.4g} s, {escape(r.window)} "
-            f"window. Grey: coherence below {display.LOW_COHERENCE}, not to be relied on. Dotted: A and d of the "
-            "evaluation."
+            f"window, aligned by {1e3 * r.align_s:.4g} ms. Grey: coherence below {display.LOW_COHERENCE}, not to be "
+            "relied on. Band: 95 % interval, where the data support one. Dotted: A and d of the evaluation."
         )
+        text += _slopes_caption(a)
         right = _chart("gain", "Gain over frequency") + _chart("delay", "Delay over frequency")
         right += _chart("coherence", "Coherence over frequency", text + _thinned(drawing["response"], "bins"))
     else:
@@ -737,6 +841,21 @@ def _frequency_charts(a: Assessment, drawing: Mapping[str, Any]) -> str:
     )
 
 
+def _slopes_caption(a: Assessment) -> str:
+    s = a.slopes
+    if s is None:
+        return f' <span data-field="slopes">No straight line over frequency: {escape(_why(a.slopes_note))}.</span>'
+    varying = [name for name, varies in (("gain", s.gain_varies), ("delay", s.delay_varies)) if varies]
+    what = f"{' and '.join(varying)} vary with frequency" if varying else "neither gain nor delay varies"
+    what = what.replace("vary", "varies") if len(varying) == 1 else what
+    slope = _number("delay_s_per_hz", s.delay_s_per_hz, "ms", 1e3)
+    between = _interval("delay_s_per_hz_interval", s.delay_s_per_hz_interval, s.delay_s_per_hz, "ms", 1e3)
+    return (
+        f" Green: straight lines over the frequencies of the energy; {what}; the delay changes by {slope} a hertz"
+        f"{f' ({between})' if between else ''}."
+    )
+
+
 def _settings_table(a: Assessment, version: str, created: datetime) -> str:
     settings = {**dataclasses.asdict(a.tracking.settings), **a.settings}
     rows = [
@@ -747,11 +866,21 @@ def _settings_table(a: Assessment, version: str, created: datetime) -> str:
         ("unit", "Unit", a.unit or "not stated"),
     ]
     rows += [(name, *_setting(name, value)) for name, value in _flat(settings)]
+    trusted = a.trusted.settings
+    rows.append(
+        (
+            "trusted",
+            "Trusted estimate",
+            f"least squares, P = Q = 1, {trusted.window}, detrend {trusted.detrend}, {trusted.noise} noise, "
+            f"delays up to {trusted.max_delay_s:g} s",
+        )
+    )
     if a.response is not None:
         r = a.response
         text = (
             f"Welch, {r.n_segments} segments of {r.segment_s:.4g} s, overlap {r.overlap:g}, "
-            f"{r.window}, detrend {r.detrend}"
+            f"{r.window}, detrend {r.detrend}, aligned by {1e3 * r.align_s:.4g} ms"
+            f"{', corrected for dispersion' if r.dispersion else ''}"
         )
         rows.append(("response", "Frequency response", text))
     rows += [("program", "Program", f"rthstrack {version}"), ("created", "Written", f"{created:%Y-%m-%d %H:%M %Z}")]
@@ -768,6 +897,9 @@ def _footer() -> str:
 it leads. Amplitude is measured over target; 1 is perfect. The evaluation is the frequency-domain one of Guo, Chen, Xu
 and Sanchez (2014), Smart Mater. Struct. 23 045042: one complex gain, the mean of measured over target with the weights
 |target|<sup>l</sup>, gives the amplitude A and the phase; the delay is d = \N{MINUS SIGN}phase / (2π f_eq) at the
-equivalent frequency f_eq, the mean frequency with the same weights.</p>
+equivalent frequency f_eq, the mean frequency with the same weights. The trusted estimate is the amplitude and the
+delay that minimise the squares of measured less the shifted, scaled target; its 95 % interval speaks of noise on the
+measured signal, and is withheld where what the fit leaves still follows the target: gain and delay are then not one
+number each.</p>
 <p class="muted">Numbers here have four significant digits; the block <code>results</code> in the source of this page
 holds them in full as JSON. Charts: uPlot 1.6.32, MIT licence, in the source.</p></footer>"""

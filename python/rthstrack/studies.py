@@ -149,6 +149,9 @@ class StudySettings:
     choose: tuple[str, ...] = ()
     tolerance: float = TOLERANCE
     shares: tuple[float, ...] = ()
+    max_delay_s: float = Settings().max_delay_s
+    noise: str = "white"
+    noise_ratio: float = 0.0
 
     def checked(self) -> StudySettings:
         """The same with the defaults filled in; raises SettingError for what is impossible whatever the source."""
@@ -156,16 +159,18 @@ class StudySettings:
         combined = COMBINED if defaults else _combined(self.combined)
         windows = _several("windows", (self.windows,) if isinstance(self.windows, str) else self.windows)
         powers = tuple(_count("weight_power", power) for power in _several("weight_powers", self.weight_powers))
-        base = Settings(self.estimator, decimator=self.decimator, detrend=self.detrend, band_hz=self.band_hz)._checked()
+        base = self._base()._checked()
         _check_band(base.band_hz)
         tolerance = _number("tolerance", self.tolerance)
         if not 0 < tolerance < 1:
             raise SettingError(f"tolerance must be a number between 0 and 1, both excluded, not {tolerance:g}")
         choose, shares = _named_factors(self.choose), _shares(self.shares)
-        if (choose or shares) and base.decimator != "spectral":
-            raise SettingError(
-                f"P and Q are chosen, and key frequencies taken, for the spectral decimator only, not {base.decimator}"
-            )
+        for what, needed, found in (
+            ("spectral decimator", "spectral", base.decimator),
+            ("estimator fei", "fei", base.estimator),
+        ):
+            if (choose or shares) and found != needed:
+                raise SettingError(f"P and Q are chosen, and key frequencies taken, for the {what} only, not {found}")
         whole = StudySettings(
             _powers_of_two("P", POWERS if self.P is None else self.P),
             _powers_of_two("Q", POWERS if self.Q is None else self.Q),
@@ -180,6 +185,9 @@ class StudySettings:
             choose,
             tolerance,
             shares,
+            base.max_delay_s,
+            base.noise,
+            base.noise_ratio,
         )
         for kind in whole._kinds():
             Evaluator(1024, 1.0, dataclasses.replace(kind, band_hz=None))
@@ -189,13 +197,25 @@ class StudySettings:
             )
         return whole
 
+    def _base(self) -> Settings:
+        """What all cells share."""
+        return Settings(
+            self.estimator,
+            decimator=self.decimator,
+            detrend=self.detrend,
+            band_hz=self.band_hz,
+            max_delay_s=self.max_delay_s,
+            noise=self.noise,
+            noise_ratio=self.noise_ratio,
+        )
+
     def _grid(self) -> list[tuple[int, int]]:
         most_p, most_q = self.combined or (math.inf, math.inf)
         return [(p, q) for p in self.P or () for q in self.Q or () if p == 1 or q == 1 or (p <= most_p and q <= most_q)]
 
     def _kinds(self) -> list[Settings]:
         """The settings of each window with each weight power, at P = Q = 1."""
-        base = Settings(self.estimator, decimator=self.decimator, detrend=self.detrend, band_hz=self.band_hz)
+        base = self._base()
         return [
             dataclasses.replace(base, window=window, weight_power=power)._checked()
             for window in self.windows
@@ -308,6 +328,9 @@ def study(
     choose: Iterable[str] = (),
     tolerance: float = TOLERANCE,
     shares: Iterable[float] = (),
+    max_delay_s: float = Settings().max_delay_s,
+    noise: str = "white",
+    noise_ratio: float = 0.0,
     progress: Callable[[int, int], object] | None = None,
 ) -> Study:
     """Amplitude, delay, their change and error, and computing time over grids of P and Q, windows and weight powers.
@@ -338,6 +361,9 @@ def study(
         choose,  # type: ignore[arg-type]
         tolerance,
         shares,  # type: ignore[arg-type]
+        max_delay_s,
+        noise,
+        noise_ratio,
     ).checked()
     pairs = _pairs(sources, truth)
     grid, kinds = settings._grid(), settings._kinds()
@@ -534,9 +560,11 @@ class _Steps:
 def _evaluated(pair: Pair, settings: Settings) -> Tracking | str:
     """The result, or why there is none."""
     try:
-        return Evaluator(pair.target.size, pair.rate_hz, settings).evaluate(pair.target, pair.measured)
+        found = Evaluator(pair.target.size, pair.rate_hz, settings).evaluate(pair.target, pair.measured)
     except (SettingError, SignalError) as error:
         return str(error)
+    undetermined = math.isnan(float(found.delay_s)) and found.reason
+    return str(found.reason).removeprefix("not determined: ") if undetermined else found
 
 
 def _cell(pair: Pair, settings: Settings, found: Tracking | str, reference: Tracking | str) -> Cell:

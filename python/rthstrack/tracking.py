@@ -19,7 +19,7 @@ from rthstrack import _core
 from rthstrack.errors import RthstrackError, SettingError, SignalError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     import pandas as pd
     from numpy.typing import ArrayLike, NDArray
@@ -188,9 +188,9 @@ class Tracking(_Result):
 
     Scalars for one pair, arrays of shape (n_actuators,) for several; intervals are (low, high), or (n_actuators, 2).
     `amplitude_std`, `amplitude_interval`, `delay_std_s`, `delay_interval_s`: standard deviation and 95 % interval, from
-    the spectrum of what the fit leaves; `residual_coherence`: how far that still follows the target, 0 to 1; `goodness`:
-    the share of measured that one gain and one delay explain. All are NaN for "fei", and where not determined: `reason`
-    says why there is no number, or no interval, and is empty where nothing is missing.
+    the spectrum of what the fit leaves; `residual_coherence`: how far that still follows the target, 0 to 1;
+    `goodness`: the share of measured that one gain and one delay explain. All are NaN for "fei", and where not
+    determined: `reason` says why there is no number, or no interval, and is empty where nothing is missing.
     With `weights=True` also, per kept bin (n_bins,) or (n_bins, n_actuators): `frequency_hz` (n_bins,), `weights`
     (sum to one), `target_spectrum` and `measured_spectrum` (complex DFT of the windowed, zero-padded signals).
     """
@@ -467,9 +467,9 @@ def evaluate(
     noise_ratio: float = 0.0,
     weights: bool = False,
 ) -> Tracking:
-    """Amplitude and delay of measured over target for whole records (Guo, Xu and Chen 2014, or by alignment).
+    """Amplitude and delay of measured over target for whole records (Guo, Xu and Chen 2014, Eqs 1-12; or by alignment).
 
-    Eqs 1-12: FEI = sum O_k conj(I_k) |I_k|^(l-2) / sum |I_k|^l,  f_eq = sum f_k |I_k|^l / sum |I_k|^l,
+    FEI = sum O_k conj(I_k) |I_k|^(l-2) / sum |I_k|^l,  f_eq = sum f_k |I_k|^l / sum |I_k|^l,
     A = |FEI|,  phi = atan2(Im FEI, Re FEI),  d = -phi / (2 pi f_eq),
     over the bins k = Q, 2Q, ... <= p/P of the transform zero-padded to n = 2^ceil(log2 L) = 2p points.
 
@@ -537,25 +537,17 @@ def _tracking(
             spectra = (columns[0][0], *(np.stack(column, axis=1) for column in columns[1:]))
     else:
         numbers = plan.evaluate(target, measured)
-    averaged: Sequence[Any]
-    precision: Sequence[Any]
+    averaged: Any
+    reason: str | tuple[str, ...]
     if target.ndim == 1:
         averaged, (*precision, reason) = numbers[0]
     else:
         averaged = [np.array(v) for v in zip(*(n[0] for n in numbers), strict=True)]
         *found_precision, reasons = zip(*(n[1] for n in numbers), strict=True)
         precision, reason = [np.array(v) for v in found_precision], tuple(reasons)
-    return Tracking(
-        *averaged,
-        plan.n_bins,
-        plan.delta_f_hz,
-        rate_hz,
-        len(target),
-        settings,
-        *precision,
-        reason,
-        *spectra,
-    )
+    about = (plan.n_bins, plan.delta_f_hz, rate_hz, len(target), settings)
+    fields: tuple[Any, ...] = (*averaged, *about, *precision, reason, *spectra)
+    return Tracking(*fields)
 
 
 def _each_actuator(
@@ -597,9 +589,9 @@ def evaluate_moving(
 ) -> MovingTracking:
     """A(t), d(t) and f_eq(t): `evaluate` on windows of window_s, one every hop_s.
 
-    Windows of W = round(window_s rate) samples start at 0, H, 2H, ... with H = round(hop_s rate); each reading of
-    "fei" is that of `evaluate` on the window's samples alone, and speaks for the window's centre (start + (W-1)/2) /
-    rate. "aligned" and "least_squares" take the shifted target's samples outside the window from the record, and where
+    Windows of W = round(window_s rate) samples start at 0, H, 2H, ... with H = round(hop_s rate); each reading of "fei"
+    is that of `evaluate` on the window's samples alone, and speaks for the window's centre (start + (W-1)/2) / rate.
+    "aligned" and "least_squares" take the shifted target's samples outside the window from the record, and where
     several delays fit a window equally well, the one nearest to the whole record's.
     Where the target's standard deviation in the window is below minimum_std_ratio times that of the whole record, or
     nothing is left to judge by, `valid` is False and the numbers are NaN.
@@ -624,15 +616,18 @@ def evaluate_moving(
     ratio = _number("minimum_std_ratio", minimum_std_ratio)
     found = _each_actuator(t, m, lambda x, y: _core.evaluate_moving(x, y, rate_hz, window_s, hop_s, ratio, settings))
     time_s = found[0][0][0]
+    averaged: Any
+    reasons: Any
     if t.ndim == 1:
-        ((_, *averaged), (*precision, reason)) = found[0]
-        reasons: Any = tuple(reason)
+        (_, *averaged), (*precision, reason) = found[0]
+        reasons = tuple(reason)
     else:
         averaged = [np.stack(column, axis=1) for column in list(zip(*(f[0] for f in found), strict=True))[1:]]
-        *columns, each = zip(*(f[1] for f in found), strict=True)
-        precision = [np.stack(column, axis=1) for column in columns]
+        *found_precision, each = zip(*(f[1] for f in found), strict=True)
+        precision = [np.stack(column, axis=1) for column in found_precision]
         reasons = tuple(tuple(r) for r in each)
-    return MovingTracking(time_s, *averaged, window_s, hop_s, ratio, rate_hz, settings, *precision, reasons)
+    columns = (time_s, *averaged, window_s, hop_s, ratio, rate_hz, settings, *precision, reasons)
+    return MovingTracking(*columns)
 
 
 def frequency_response(

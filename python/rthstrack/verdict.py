@@ -10,13 +10,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rthstrack.display import with_interval
 from rthstrack.readers.units import length_factor
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     from rthstrack.assessment import Limits
-    from rthstrack.tracking import FrequencyResponse, MovingTracking, Tracking
+    from rthstrack.tracking import FrequencyResponse, FrequencySlopes, MovingTracking, Tracking
 
 # An amplitude this near to one is called right: no displacement sensor of a test rig is better.
 _RIGHT_AMPLITUDE = 5e-4
@@ -35,13 +38,29 @@ _CLIPPED_RUN, _CLIPPED_STD, _CLIPPED_SPEED = 5, 1.5, 0.2
 _ODD_AMPLITUDE = 3.0
 # Spread of the delay over the frequencies that carry the weight, as a share of the delay.
 _DELAY_SPREAD = 0.2
+# Two estimates this near may stand for each other, however narrow the interval: a thousandth of the delay, a micro-
+# second, and the amplitude as above.
+_SAME_DELAY, _SAME_DELAY_S = 1e-3, 1e-6
+# Without an interval to hold the difference against, one of a hundredth counts.
+_NOTABLE = 1e-2
+# A change of one setting is the cause of a difference when it leaves less than this share of it.
+_EXPLAINED = 0.5
+# Phases that spread less than this average well.
+_WIDE_RAD = math.pi / 6
+# Over time: the middle eight tenths of the windows differ by this share, and by this many of their own half intervals.
+_UNSTEADY, _UNSTEADY_INTERVALS, _STEADY_WINDOWS = 0.1, 3.0, 4
+# Windows one length apart differ by this much less than if they had nothing to do with each other.
+_GRADUAL = 0.5
+# Share of the changes over time that follow the motion's frequency, from which they are left to it.
+_BY_FREQUENCY = 0.5
 
 
 def sentence(tracking: Tracking, target: str = "target", measured: str = "measured") -> str:
     """The verdict, for example: measured lags target by 13.2 ms and is 1.8 % too large, judged at 0.9 Hz."""
     delay_s, amplitude = float(tracking.delay_s), float(tracking.amplitude)
     if math.isnan(delay_s):
-        return f"{measured} does not move: it has no delay"
+        said = _undetermined(tracking)
+        return f"{measured} does not move: it has no delay" if said == _NO_MOTION else f"not determined: {said}"
     milliseconds = f"{1e3 * abs(delay_s):.3g} ms"
     if float(f"{1e3 * abs(delay_s):.3g}") == 0:
         timing = f"{measured} is in time with {target}"
@@ -55,6 +74,284 @@ def sentence(tracking: Tracking, target: str = "target", measured: str = "measur
     else:
         size = f"is {_percent(abs(excess))} % too {'large' if excess > 0 else 'small'}"
     return f"{timing} and {size}, judged at {float(tracking.equivalent_frequency_hz):.2g} Hz"
+
+
+_NO_MOTION = "measured does not move"
+
+
+def reason(tracking: Tracking) -> str | None:
+    """Why a number or its interval is missing; None where nothing is, and for the published estimator's intervals."""
+    if not tracking.reason and math.isnan(float(tracking.delay_s)):
+        return f"not determined: {_NO_MOTION}"
+    return str(tracking.reason) or None
+
+
+def _undetermined(tracking: Tracking) -> str | None:
+    """Why there is no number; None where there is one."""
+    if not math.isnan(float(tracking.delay_s)):
+        return None
+    return (reason(tracking) or "").removeprefix("not determined: ")
+
+
+def differ(tracking: Tracking, trusted: Tracking) -> bool:
+    """Whether amplitude or delay differ by more than the trusted interval, and by enough to matter."""
+    return bool(_differences(tracking, trusted))
+
+
+def _differences(tracking: Tracking, trusted: Tracking) -> list[str]:
+    """Which of "delay_s" and "amplitude" differ."""
+    found = []
+    for name, interval, share, least in (
+        ("delay_s", trusted.delay_interval_s, _SAME_DELAY, _SAME_DELAY_S),
+        ("amplitude", trusted.amplitude_interval, _RIGHT_AMPLITUDE, 0.0),
+    ):
+        ours, theirs = float(getattr(tracking, name)), float(getattr(trusted, name))
+        low, high = (float(end) for end in interval)
+        if math.isnan(low):
+            share = _NOTABLE
+        if abs(ours - theirs) > max(share * abs(theirs), least) and not low <= ours <= high:
+            found.append(name)
+    return found
+
+
+# What to do where the reason itself does not say.
+_ADVICE = {
+    "too little motion to judge by": "; are these the right channels?",
+    "the iteration did not settle on a delay": "; judge only the frequencies at which target moves (--band)",
+}
+_NAMES = {
+    "fei": "the published average",
+    "aligned": "the aligned average",
+    "least_squares": "least squares as asked for",
+}
+
+
+def argument(
+    target: NDArray[np.float64],
+    tracking: Tracking,
+    trusted: Tracking,
+    trusted_moving: MovingTracking | None,
+    slopes: FrequencySlopes | None,
+    variants: Mapping[str, Tracking],
+    found: Mapping[str, str],
+) -> tuple[str, str | None]:
+    """In one sentence, which number to use and why; and the name of that warning of `found` which it says itself.
+
+    `tracking` is the estimate asked for, with weights; `variants` are the same with one setting changed.
+    """
+    if (missing := _undetermined(trusted)) is not None:
+        said = "no number can be trusted here" if _undetermined(tracking) is None else "there is no number to use"
+        return f"{said}: {missing}{_ADVICE.get(missing, '')}", None
+    if (unsteady := _unsteady(trusted_moving)) is not None:
+        name, text = unsteady
+        return f"{text}; {_averages(tracking, trusted, name)}", None
+    if slopes is not None and slopes.delay_varies:
+        return f"{_varying_delay(slopes)}; {_averages(tracking, trusted)}", "delay spread"
+    if slopes is not None and slopes.gain_varies:
+        return f"{_varying_gain(slopes)}; {_averages(tracking, trusted, 'amplitude')}", None
+    if tracking is trusted:
+        interval = "with its interval" if not trusted.reason else f"for which there is {trusted.reason}"
+        return f"this is the trusted estimate, {interval}", None
+    ours = _NAMES[tracking.settings.estimator]
+    which = _differences(tracking, trusted)
+    if not which:
+        return f"{ours} agrees with the trusted estimate {_how_well(tracking, trusted)}", None
+    cause, text = _cause(target, tracking, trusted, which, slopes, variants, found)
+    gap = " and ".join(_gap(name, tracking, trusted) for name in which)
+    return f"use the trusted estimate: {ours} is {gap}, {text}", cause
+
+
+def _how_well(tracking: Tracking, trusted: Tracking) -> str:
+    if trusted.reason:
+        return f"to a hundredth ({trusted.reason})"
+    inside = all(
+        low <= ours <= high
+        for ours, (low, high) in (
+            (float(tracking.delay_s), trusted.delay_interval_s),
+            (float(tracking.amplitude), trusted.amplitude_interval),
+        )
+    )
+    return "within its interval" if inside else "to a thousandth"
+
+
+def _averages(tracking: Tracking, trusted: Tracking, name: str = "delay_s") -> str:
+    """What single numbers are worth where gain or delay change."""
+
+    def text(t: Tracking) -> str:
+        value = float(getattr(t, name))
+        return f"{1e3 * value:.3g} ms" if name == "delay_s" else f"{value:.3g}"
+
+    if tracking is trusted or name not in _differences(tracking, trusted):
+        return f"{text(trusted)} is an average of it"
+    which = {"fei": "published", "aligned": "aligned"}.get(tracking.settings.estimator, "as asked for")
+    return f"{text(tracking)} ({which}) and {text(trusted)} (trusted) are two averages of it"
+
+
+def _gap(name: str, tracking: Tracking, trusted: Tracking) -> str:
+    """How far the estimate is from the trusted one: 0.026 ms below, 1.2 % above."""
+    ours, theirs = float(getattr(tracking, name)), float(getattr(trusted, name))
+    where = "above" if ours > theirs else "below"
+    if name == "delay_s":
+        return f"{_percent(1e3 * abs(ours - theirs))} ms {where}"
+    return f"{_percent(100 * abs(ours / theirs - 1))} % {where} in amplitude"
+
+
+def _line(value: float, interval: tuple[float, float], factor: float, what: str) -> str:
+    """A slope with its interval: falling by 0.42 ms a hertz (0.40 to 0.44)."""
+    ends = sorted(factor * abs(end) for end in interval)
+    if interval[0] <= 0 <= interval[1]:
+        return "bent over the frequencies"
+    number, _, between = with_interval(factor * abs(value), ends).partition(" ")
+    return f"{'rising' if value > 0 else 'falling'} by {number}{what} a hertz {between}".rstrip()
+
+
+def _varying_delay(s: FrequencySlopes) -> str:
+    value = _value(1e3 * s.delay_s, 1e3 * s.delay_std_s, 1e3 * s.delay_misfit_s)
+    slope = _line(s.delay_s_per_hz, s.delay_s_per_hz_interval, 1e3, " ms")
+    return (
+        f"the delay is not one number: {value} ms at {s.equivalent_frequency_hz:.2g} Hz, {slope} "
+        f"from {s.band_hz[0]:.2g} to {s.band_hz[1]:.2g} Hz, give or take {1e3 * s.delay_misfit_s:.2g} ms"
+    )
+
+
+def _varying_gain(s: FrequencySlopes) -> str:
+    value = _value(s.gain, s.gain_std, s.gain_misfit)
+    slope = _line(s.gain_per_hz, s.gain_per_hz_interval, 1.0, "")
+    return (
+        f"the gain is not one number: {value} at {s.equivalent_frequency_hz:.2g} Hz, {slope} "
+        f"from {s.band_hz[0]:.2g} to {s.band_hz[1]:.2g} Hz, give or take {s.gain_misfit:.2g}"
+    )
+
+
+def _value(value: float, std: float, misfit: float) -> str:
+    """A line's value with the digits that noise, and what the curve departs from the line, leave it."""
+    doubt = max(std, misfit)
+    return with_interval(value, (value - doubt, value + doubt)).partition(" (")[0]
+
+
+def _unsteady(moving: MovingTracking | None) -> tuple[str, str] | None:
+    """Whether delay or amplitude change over time, by the windows that have an interval: which, and in words."""
+    if moving is None:
+        return None
+    for name, values, interval, factor, unit in (
+        ("delay_s", moving.delay_s, moving.delay_interval_s, 1e3, " ms"),
+        ("amplitude", moving.amplitude, moving.amplitude_interval, 1.0, ""),
+    ):
+        known = moving.valid & np.isfinite(interval[:, 0])
+        if known.sum() < _STEADY_WINDOWS:
+            return None
+        # Noise on target is in no interval; but it differs from window to window, where an actuator changes gradually.
+        apart = max(1, round(moving.window_s / moving.hop_s))
+        pairs = known[apart:] & known[:-apart]
+        steps = (values[apart:] - values[:-apart])[pairs]
+        if steps.size < _STEADY_WINDOWS or np.mean(steps**2) > _GRADUAL * 2 * np.var(values[known]):
+            continue
+        # Where the motion's frequency changes over time, it is the frequency that tells of the actuator.
+        f_eq = moving.equivalent_frequency_hz[known]
+        if np.std(f_eq) > 0 and np.corrcoef(values[known], f_eq)[0, 1] ** 2 > _BY_FREQUENCY:
+            continue
+        low, high = (float(end) for end in np.quantile(values[known], (0.1, 0.9)))
+        noise = float(np.median(interval[known, 1] - interval[known, 0])) / 2
+        if high - low > max(_UNSTEADY * abs(float(np.median(values[known]))), _UNSTEADY_INTERVALS * noise):
+            span = f"{factor * low:.3g} to {factor * high:.3g}{unit}"
+            what = name.removesuffix("_s")
+            share = f"in 80 % of the windows of {moving.window_s:.3g} s"
+            return name, f"the {what} is not one number: {span} over time, {share}"
+    return None
+
+
+def _cause(
+    target: NDArray[np.float64],
+    tracking: Tracking,
+    trusted: Tracking,
+    which: list[str],
+    slopes: FrequencySlopes | None,
+    variants: Mapping[str, Tracking],
+    found: Mapping[str, str],
+) -> tuple[str | None, str]:
+    """Why the estimate misses the trusted one: the name of the warning that it says, and the cause in words.
+
+    Each suspect is tried on the number that is off by most: what is left of the difference without it?
+    """
+
+    def relative(name: str) -> float:
+        return abs(float(getattr(tracking, name)) / float(getattr(trusted, name)) - 1)
+
+    name = max(which, key=relative)
+    ours, theirs = float(getattr(tracking, name)), float(getattr(trusted, name))
+    readings = {change: float(getattr(variant, name)) for change, variant in variants.items()}
+    if (averaged := _phases_averaged(tracking, trusted)) is not None:
+        # What averaging makes of a constant delay is taken off.
+        readings["wrap"] = ours - averaged[name] + theirs
+    remains = {change: abs(reading - theirs) / abs(ours - theirs) for change, reading in readings.items()}
+    # Another average only tells that the difference is made before averaging, so it is the last to be asked.
+    suspects = [change for change in ("detrend", "window", "band", "wrap") if remains.get(change, 1.0) < _EXPLAINED]
+    if not suspects and remains.get("estimator", 1.0) < _EXPLAINED:
+        suspects = ["estimator"]
+    if not suspects:
+        return None, "which neither drift, window, noise nor wide phases explain alone"
+    cause = min(suspects, key=remains.__getitem__)
+    if cause == "wrap":
+        low, high = (360 * abs(float(trusted.delay_s)) * edge for edge in _middle(tracking))
+        if low > 180:
+            return None, f"as it takes phases of {low:.0f} to {high:.0f} degrees for less than half a turn"
+        return None, f"as it averages phases that spread from {low:.0f} to {high:.0f} degrees"
+    window = tracking.settings.window
+    scale, unit = (1e3, " ms") if name == "delay_s" else (1.0, "")
+    reading = f"it reads {'d' if unit else 'A'} = {scale * readings[cause]:.4g}{unit}"
+    if cause == "estimator":
+        where = "its two ends act" if window == "boxcar" else f"the {window} window acts"
+        return None, f"as {where} on different points of both motions: with --estimator aligned {reading}"
+    if cause == "band":
+        low, high = variants["band"].settings.band_hz or (0.0, math.inf)
+        said = "noise" if "noise" in found else None
+        return said, f"as noise above {high:.3g} Hz counts as motion: with --band {low:g} {high:.3g} {reading}"
+    remedy = (
+        f"--detrend {variants[cause].settings.detrend}"
+        if cause == "detrend"
+        else f"--window {variants[cause].settings.window}"
+    )
+    if cause == "window" and window != "boxcar":
+        return None, f"as the {window} window acts on different points of both motions: with {remedy} {reading}"
+    if "drift" in found:
+        return "drift", f"as {found['drift'].partition(': try')[0]}: with {remedy} {reading}"
+    return None, f"as {_ends_apart(target)}: with {remedy} {reading}"
+
+
+def _middle(tracking: Tracking) -> tuple[float, float]:
+    """The frequencies between which the middle nine tenths of the weight lie."""
+    assert tracking.frequency_hz is not None
+    assert tracking.weights is not None
+    share = np.cumsum(tracking.weights)
+    first, last = np.searchsorted(share, (0.05, 0.95)).clip(max=share.size - 1)
+    return float(tracking.frequency_hz[first]), float(tracking.frequency_hz[last])
+
+
+def _ends_apart(target: NDArray[np.float64]) -> str:
+    """Where the record starts and ends, in standard deviations of the target from its mean."""
+    n = max(1, target.size // 50)
+    mean, spread = float(target.mean()), float(target.std())
+    first, last = (float(part.mean() - mean) / spread for part in (target[:n], target[-n:]))
+    return (
+        f"target does not begin and end at its mean ({first:+.2g} and {last:+.2g} standard deviations), "
+        "which acts on it and on measured at different points of the motion"
+    )
+
+
+def _phases_averaged(tracking: Tracking, trusted: Tracking) -> dict[str, float] | None:
+    """What the published average makes of the trusted amplitude and delay, were they the same at every frequency."""
+    frequency, weights = tracking.frequency_hz, tracking.weights
+    if tracking.settings.estimator != "fei" or frequency is None or weights is None:
+        return None
+    low, high = (2 * math.pi * abs(float(trusted.delay_s)) * edge for edge in _middle(tracking))
+    if high - low < _WIDE_RAD and high < math.pi:
+        return None
+    mean = complex((weights * np.exp(-2j * np.pi * float(trusted.delay_s) * frequency)).sum())
+    f_eq = float(tracking.equivalent_frequency_hz)
+    return {
+        "amplitude": abs(mean) * float(trusted.amplitude),
+        "delay_s": -float(np.angle(mean)) / (2 * math.pi * f_eq),
+    }
 
 
 def _percent(value: float) -> str:
@@ -81,22 +378,26 @@ def warnings(
     response: FrequencyResponse | None,
     units: tuple[str | None, str | None] = (None, None),
     names: tuple[str, str] = ("target", "measured"),
-) -> tuple[str, ...]:
-    """What makes the numbers less trustworthy than they look, most serious first; `tracking` carries its weights."""
+) -> dict[str, str]:
+    """What makes the numbers less trustworthy than they look, by name, most serious first.
+
+    `tracking` carries its weights.
+    """
     duration_s = tracking.n_samples / tracking.rate_hz
-    found = [
-        _unlike_units(units, names),
-        _wrap(tracking, names),
-        _odd_amplitude(tracking, units),
-        *(_clipped(signal, name) for signal, name in zip((target, measured), names, strict=True)),
-        _drift(target, tracking, duration_s),
-        _high_energy(tracking),
-        _coherence(tracking, response, names),
-        _delay_spread(tracking, response),
-        _levels(target, names[0]),
-        _quiet(moving, names[0]),
-    ]
-    return tuple(w for w in found if w)
+    found = {
+        "units": _unlike_units(units, names),
+        "wrap": _wrap(tracking, names),
+        "amplitude": _odd_amplitude(tracking, units),
+        "clipped target": _clipped(target, names[0]),
+        "clipped measured": _clipped(measured, names[1]),
+        "drift": _drift(target, tracking, duration_s),
+        "noise": _high_energy(tracking),
+        "coherence": _coherence(tracking, response, names),
+        "delay spread": _delay_spread(tracking, response),
+        "levels": _levels(target, names[0]),
+        "quiet": _quiet(moving, names[0]),
+    }
+    return {name: text for name, text in found.items() if text}
 
 
 def _unlike_units(units: tuple[str | None, str | None], names: tuple[str, str]) -> str | None:
@@ -112,7 +413,7 @@ def _unlike_units(units: tuple[str | None, str | None], names: tuple[str, str]) 
 
 def _wrap(tracking: Tracking, names: tuple[str, str]) -> str | None:
     phase = float(tracking.phase_rad)
-    if abs(phase) < _WRAP_RAD:
+    if not abs(phase) >= _WRAP_RAD:
         return None
     turn_s = 1 / float(tracking.equivalent_frequency_hz)
     return (
@@ -123,7 +424,7 @@ def _wrap(tracking: Tracking, names: tuple[str, str]) -> str | None:
 
 def _odd_amplitude(tracking: Tracking, units: tuple[str | None, str | None]) -> str | None:
     amplitude = float(tracking.amplitude)
-    if 1 / _ODD_AMPLITUDE < amplitude < _ODD_AMPLITUDE or units[0] != units[1]:
+    if math.isnan(amplitude) or 1 / _ODD_AMPLITUDE < amplitude < _ODD_AMPLITUDE or units[0] != units[1]:
         return None
     return f"amplitude {amplitude:.3g} is far from 1: are both channels displacements in the same unit? (--scale)"
 

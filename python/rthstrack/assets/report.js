@@ -55,6 +55,9 @@
     return [around + limit, around - limit].map((value) => ({ value, label: `limit ${format(value)}` }));
   }
 
+  /* A level that is not determined is no level. */
+  const reference = (value, label, factor = 1) => (value == null ? [] : [{ value: value * factor, label }]);
+
   function drawTime(panel, a, host) {
     const t = a.time;
     const x = times(t);
@@ -95,19 +98,31 @@
     if (!m) return;
     const x = column(m.time);
     const shades = m.invalid.map(([from, to]) => ({ from, to }));
-    Charts.lines(host("moving-amplitude"), {
-      x: axis, y: { label: "Amplitude A (-)", least: 0.02 }, height: 190, shades, data: [x, gaps(column(m.amplitude))],
-      references: [{ value: 1 }, { value: a.amplitude, label: "whole record" }],
-      limits: limitPair(a.limits.amplitude, 1, Charts.short),
-      series: [{ label: `amplitude, ${m.label}`, colour: "value", width: 1.5 }],
-    });
-    Charts.lines(host("moving-delay"), {
-      x: axis, y: { label: "Delay d (ms)", unit: "ms", least: 0.5 }, height: 190, shades,
-      data: [x, gaps(column(m.delay_s), 1e3)],
-      references: [{ value: 0 }, { value: a.delay_s * 1e3, label: "whole record" }],
-      limits: limitPair(a.limits.delay_s == null ? null : a.limits.delay_s * 1e3, 0, (v) => `${Charts.short(v)} ms`),
-      series: [{ label: `delay, ${m.label}`, colour: "value", width: 1.5 }],
-    });
+    /* The estimate asked for, and in front of it the trusted one with its interval, where it is another. */
+    const chart = (host, name, label, unit, least, factor, whole, limits) => {
+      const take = (key) => gaps(column(m[key]), factor);
+      const [low, high] = name === "delay" ? ["delay_low_s", "delay_high_s"] : ["amplitude_low", "amplitude_high"];
+      const key = name === "delay" ? "delay_s" : "amplitude";
+      const second = m.both ? [{ label: `trusted ${name}`, colour: "value", width: 1.5 }] : [];
+      const band = m.trusted_amplitude ? [take(high), take(low)] : [];
+      const ownLabel = m.both ? `${m.name} ${name}` : `${name}, ${m.label}`;
+      const first = { label: ownLabel, colour: m.both ? "third" : "value", width: 1.5 };
+      const edge = { label: "interval", colour: "interval", width: 0.5, silent: true };
+      const n = 1 + second.length;
+      Charts.lines(host, {
+        x: axis, y: { label, unit, least }, height: 190, shades, limits,
+        data: [x, take(key), ...(m.both ? [take(`trusted_${key}`)] : []), ...band],
+        references: [{ value: name === "delay" ? 0 : 1 }, ...reference(whole, "whole record", factor)],
+        series: [first, ...second, ...band.map(() => edge)],
+        intervals: band.length ? [[n + 1, n + 2]] : [],
+      });
+    };
+    const overall = m.both && a.trusted_delay_s !== null
+      ? [a.trusted_amplitude, a.trusted_delay_s] : [a.amplitude, a.delay_s];
+    chart(host("moving-amplitude"), "amplitude", "Amplitude A (-)", "", 0.02, 1, overall[0],
+      limitPair(a.limits.amplitude, 1, Charts.short));
+    chart(host("moving-delay"), "delay", "Delay d (ms)", "ms", 0.5, 1e3, overall[1],
+      limitPair(a.limits.delay_s == null ? null : a.limits.delay_s * 1e3, 0, (v) => `${Charts.short(v)} ms`));
   }
 
   function drawHistories(a, host, axis) {
@@ -163,18 +178,32 @@
     const coherence = column(r.coherence);
     const sure = coherence.map((c) => (c >= r.low_coherence ? 1 : 0));
     const any = sure.some((v) => v);
-    const curve = (name, label, unit, least, values, references, limits) => Charts.lines(host(name), {
-      x: axis, y: { label, unit, least }, height: 180, marks: bare, shades, references, limits,
-      data: [x, gaps(values), where(values, sure)],
-      series: [
-        { label: name, colour: "doubtful", swatch: "value", auto: !any },
-        { label: name, colour: "value", width: 1.75, silent: true },
-      ],
-    });
-    curve("gain", "Gain (-)", "", 0.02, column(r.gain),
-      [{ value: 1 }, { value: a.amplitude, label: "A" }], limitPair(a.limits.amplitude, 1, Charts.short));
-    curve("delay", "Delay (ms)", "ms", 0.5, column(r.delay_s).map((d) => d * 1e3),
-      [{ value: 0 }, { value: a.delay_s * 1e3, label: "d" }],
+    const line = (key, factor) => {
+      if (!r.line) return [];
+      const [value, slope] = r.line[key];
+      const inside = (f) => f >= r.line.band[0] * (1 - 1e-9) && f <= r.line.band[1] * (1 + 1e-9);
+      return [Array.from(x, (f) => (inside(f) ? factor * (value + slope * (f - r.line.at)) : null))];
+    };
+    const curve = (name, label, unit, least, factor, keys, references, limits) => {
+      const [values, low, high] = keys.map((key) => Array.from(column(r[key]), (v) => v * factor));
+      const straight = line(keys[0], factor);
+      const edge = { label: "interval", colour: "interval", width: 0.5, auto: false, silent: true };
+      Charts.lines(host(name), {
+        x: axis, y: { label, unit, least }, height: 180, marks: bare, shades, references, limits,
+        data: [x, gaps(values), where(values, sure), gaps(high), gaps(low), ...straight],
+        series: [
+          { label: name, colour: "doubtful", swatch: "value", auto: !any },
+          { label: name, colour: "value", width: 1.75, silent: true },
+          edge, edge,
+          ...straight.map(() => ({ label: "line", colour: "second", dash: [6, 4], width: 1.5 })),
+        ],
+        intervals: [[3, 4]],
+      });
+    };
+    curve("gain", "Gain (-)", "", 0.02, 1, ["gain", "gain_low", "gain_high"],
+      [{ value: 1 }, ...reference(a.amplitude, "A")], limitPair(a.limits.amplitude, 1, Charts.short));
+    curve("delay", "Delay (ms)", "ms", 0.5, 1e3, ["delay_s", "delay_low_s", "delay_high_s"],
+      [{ value: 0 }, ...reference(a.delay_s, "d", 1e3)],
       limitPair(a.limits.delay_s == null ? null : a.limits.delay_s * 1e3, 0, (v) => `${Charts.short(v)} ms`));
     Charts.lines(host("coherence"), {
       x: axis, y: { label: "Coherence (-)", fixed: [0, 1.05] }, height: 150, marks: bare, shades,

@@ -7,8 +7,12 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rthstrack.tracking import Settings
+
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+ESTIMATORS = ("fei", "aligned", "least_squares")
 
 
 def add_signals(parser: argparse.ArgumentParser, title: str) -> argparse._ArgumentGroup:
@@ -34,7 +38,14 @@ def add_signals(parser: argparse.ArgumentParser, title: str) -> argparse._Argume
 def add_method(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
     """What every evaluation settles, whatever its P and Q."""
     method = parser.add_argument_group("evaluation")
-    method.add_argument("--estimator", choices=("fei",), default="fei", help="default: fei, the published one")
+    method.add_argument("--estimator", choices=ESTIMATORS, default="fei", metavar="E",
+                        help="fei (default, as published), aligned or least_squares")  # fmt: skip
+    method.add_argument("--max-delay", type=positive, default=Settings().max_delay_s, metavar="S",
+                        help="largest delay or lead looked for by all estimators but fei (%(default)s s)")  # fmt: skip
+    method.add_argument("--noise", choices=("white", "coloured"), default="white", metavar="N",
+                        help="noise on measured, for least_squares: white (default) or coloured")  # fmt: skip
+    method.add_argument("--noise-ratio", type=not_negative, default=0.0, metavar="X",
+                        help="noise on target over that on measured, for least_squares (0)")  # fmt: skip
     method.add_argument("--decimator", choices=("spectral", "chebyshev"), default="spectral", metavar="D",
                         help="how P is done: spectral (default) or chebyshev, as published")  # fmt: skip
     method.add_argument("--detrend", choices=("none", "mean", "linear"), default="none", metavar="D",

@@ -13,17 +13,23 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rthstrack.assessment import Assessment, Limits, assess, result_entry
+from rthstrack import display
+from rthstrack.assessment import Assessment, Limits, assess, json_ready, result_entry
 from rthstrack.cli.arguments import add_method, add_signals, factor, path, positive, tolerance, weight_power
+from rthstrack.display import with_interval
 from rthstrack.errors import RecordingError, RthstrackError, SettingError, SignalError
 from rthstrack.factors import TOLERANCE
 from rthstrack.recording import Recording, propose_pair, read_recording
-from rthstrack.tracking import Settings
+from rthstrack.tracking import Evaluator, Settings
+from rthstrack.verdict import reason
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from rich.console import Console
+    from rich.table import Table
+
+    from rthstrack.tracking import MovingTracking
 
 FAILED, EXCEEDED = 1, 3
 _FIGURES = (".png", ".pdf", ".svg")
@@ -189,6 +195,9 @@ def _settings(args: argparse.Namespace) -> Settings:
         window=args.window,
         detrend=args.detrend,
         band_hz=tuple(args.band) if args.band else None,
+        max_delay_s=args.max_delay,
+        noise=args.noise,
+        noise_ratio=args.noise_ratio,
     )
 
 
@@ -204,6 +213,15 @@ def _check(args: argparse.Namespace, misuse: Callable[[str], Any]) -> None:
         misuse("--tolerance speaks of P and Q that are chosen: give -P auto, -Q auto or both")
     if chosen and args.decimator != "spectral":
         misuse(f"-P auto and -Q auto need --decimator spectral, found {args.decimator}")
+    if chosen and args.estimator != "fei":
+        misuse(f"-P auto and -Q auto need --estimator fei, found {args.estimator}")
+    try:
+        # Whether P, Q and band leave anything depends on the record; whether they go together does not.
+        few = min(args.P or 1, 2)
+        settings = dataclasses.replace(_settings(args), data_decimation=few, frequency_decimation=1, band_hz=None)
+        Evaluator(1024, 1.0, settings)
+    except SettingError as error:
+        misuse(str(error))
     if args.band and args.band[0] > args.band[1]:
         misuse(f"--band LO HI: LO must not exceed HI, found {args.band[0]:g} {args.band[1]:g}")
     if args.start is not None and args.end is not None and args.start >= args.end:
@@ -294,19 +312,35 @@ def _flat(entry: dict[str, Any], before: str = "") -> dict[str, Any]:
     for key, value in entry.items():
         if isinstance(value, dict):
             row |= _flat(value, f"{before}{key}.")
+        elif "interval" in key:
+            stem, unit = (key[:-2], "_s") if key.endswith("_s") else (key, "")
+            row |= dict(
+                zip((f"{before}{stem}_low{unit}", f"{before}{stem}_high{unit}"), value or ("", ""), strict=True)
+            )
         else:
             row[before + key] = "; ".join(map(str, value)) if isinstance(value, list | tuple) else value
     return row
 
 
+_READING = (
+    "amplitude", "delay_s", "phase_rad", "equivalent_frequency_hz", "valid", "amplitude_std", "amplitude_interval",
+    "delay_std_s", "delay_interval_s", "residual_coherence", "goodness", "reason",
+)  # fmt: skip
+_TRUSTED_READING = ("amplitude", "delay_s", "valid", "amplitude_interval", "delay_interval_s", "reason")
+
+
 def _readings(a: Assessment) -> Iterable[dict[str, Any]]:
-    if a.moving is None:
+    if a.moving is None or a.trusted_moving is None:
         return
-    columns = a.moving.to_dict()
-    names = ("amplitude", "delay_s", "phase_rad", "equivalent_frequency_hz", "valid")
-    for i, time_s in enumerate(columns["time_s"]):
-        about = {"file": a.file, "actuator": a.actuator, "target": a.target_name, "measured": a.measured_name}
-        yield about | {"time_s": a.start_s + time_s} | {name: columns[name][i] for name in names}
+    about = {"file": a.file, "actuator": a.actuator, "target": a.target_name, "measured": a.measured_name}
+    for i, time_s in enumerate(a.moving.time_s):
+        row = {name: json_ready(getattr(a.moving, name)[i]) for name in _READING}
+        trusted = {f"trusted_{name}": json_ready(getattr(a.trusted_moving, name)[i]) for name in _TRUSTED_READING}
+        for name, value in (row | trusted).items():
+            # No interval is no pair of missing ends.
+            if "interval" in name and None in value:
+                (row if name in row else trusted)[name] = None
+        yield _flat(about | {"time_s": a.start_s + float(time_s)} | row | trusted)
 
 
 def _write_csv(path: Path, rows: Sequence[dict[str, Any]]) -> None:
@@ -339,8 +373,10 @@ def _print_one(console: Console, a: Assessment) -> None:
     t, i = a.tracking, a.indices
     which = f"actuator {a.actuator}: " if a.actuator else ""
     console.print(Text(f"{which}{_PARTS[a.part]}{a.verdict}", style="bold"))
+    console.print(Text(a.argument))
     for text in a.exceeded:
         console.print(Text(f"limit exceeded: {text}", style="bold red"))
+    console.print(_side_by_side(a))
     unit = f" {a.unit}" if a.unit else ""
     table = Table(box=None, show_header=False, pad_edge=False)
     table.add_column(style="dim", no_wrap=True)
@@ -349,12 +385,11 @@ def _print_one(console: Console, a: Assessment) -> None:
     for label, value in (
         ("file", f"{a.file}, {t.n_samples} samples at {a.rate_hz:g} Hz ({a.settings.get('rate_source', 'given')})"),
         ("target, measured", f"{a.target_name}, {a.measured_name}"),
-        ("amplitude", f"{t.amplitude:.6g}"),
-        ("delay", f"{1e3 * float(t.delay_s):.6g} ms"),
-        ("phase", f"{math.degrees(float(t.phase_rad)):.5g} degrees at {float(t.equivalent_frequency_hz):.5g} Hz"),
+        ("phase", _number(math.degrees(float(t.phase_rad)), ".5g", " degrees")),
         ("bins", f"{t.n_bins}, every {t.delta_f_hz:.4g} Hz{band}"),
+        *_reason_rows(a),
         *([("P and Q chosen", a.factors.sentence)] if a.factors else []),
-        ("moving windows", _moving_text(a)),
+        *_moving_rows(a),
         ("max tracking error", f"{i.max_tracking_error:.4g}{unit} ({i.max_tracking_error_percent:.3g} %)"),
         ("rms error", f"{i.rms_error:.4g}{unit} ({i.rms_error_percent:.3g} %)"),
         ("tracking indicator", f"{i.tracking_indicator:.4g}" + (f"{unit}^2" if unit else "")),
@@ -367,27 +402,83 @@ def _print_one(console: Console, a: Assessment) -> None:
     console.print()
 
 
-def _moving_text(a: Assessment) -> str:
+_ESTIMATORS = {"fei": "published (fei)", "aligned": "aligned", "least_squares": "least squares"}
+
+
+def _side_by_side(a: Assessment) -> Table:
+    """The estimate asked for and the trusted one, with their 95 % intervals as far as there are any."""
+    from rich.table import Table
+    from rich.text import Text
+
+    columns = [a.tracking] if a.trusted is a.tracking else [a.tracking, a.trusted]
+    table = Table(box=None, pad_edge=False)
+    table.add_column("", style="dim", no_wrap=True)
+    for t in columns:
+        trusted = "trusted (least squares), 95 % interval"
+        table.add_column(trusted if t is a.trusted else _ESTIMATORS[t.settings.estimator])
+    rows = [
+        ("amplitude", [_estimate(float(t.amplitude), t.amplitude_interval) for t in columns]),
+        (
+            "delay",
+            [_estimate(1e3 * float(t.delay_s), [1e3 * end for end in t.delay_interval_s], "ms") for t in columns],
+        ),
+        ("at", [_number(float(t.equivalent_frequency_hz), ".5g", " Hz") for t in columns]),
+    ]
+    for label, cells in rows:
+        table.add_row(label, *map(Text, cells))
+    return table
+
+
+def _estimate(value: float, interval: Iterable[float], unit: str = "") -> str:
+    low, high = interval
+    if math.isfinite(value) and not math.isfinite(high - low):
+        return f"{value:.6g} {unit}".rstrip()
+    return with_interval(value, (low, high), unit)
+
+
+def _number(value: float, layout: str, unit: str) -> str:
+    return f"{value:{layout}}{unit}" if math.isfinite(value) else "not determined"
+
+
+def _windows_text(a: Assessment, moving: MovingTracking) -> str:
     import numpy as np
 
-    if a.moving is None:
-        return a.moving_note or ""
-    valid = a.moving.valid
-    if not valid.any():
-        return "no window has enough energy to judge by"
-    delays, amplitudes = 1e3 * a.moving.delay_s[valid], a.moving.amplitude[valid]
+    known = moving.valid & np.isfinite(moving.delay_s)
+    if not known.any():
+        return f"no window could be judged{_most_frequent(moving)}"
+    delays, amplitudes = 1e3 * moving.delay_s[known], moving.amplitude[known]
     (low, high), (small, large) = np.quantile(delays, (0.1, 0.9)), np.quantile(amplitudes, (0.1, 0.9))
     return (
-        f"of {a.moving.window_s:g} s{_moving_factors(a)}: delay {low:.4g} to {high:.4g} ms, "
-        f"amplitude {small:.4g} to {large:.4g} (10 to 90 % of {valid.sum()} readings)"
+        f"of {moving.window_s:g} s{_moving_factors(a, moving)}: delay {low:.4g} to {high:.4g} ms, "
+        f"amplitude {small:.4g} to {large:.4g} (10 to 90 % of {known.sum()} readings)"
     )
 
 
-def _moving_factors(a: Assessment) -> str:
+def _most_frequent(moving: MovingTracking) -> str:
+    counted = display.reasons(moving)
+    return f": {counted[0][1]}" if counted else ""
+
+
+def _reason_rows(a: Assessment) -> list[tuple[str, str]]:
+    """Why a number or an interval is missing, each reason once."""
+    reasons = dict.fromkeys(filter(None, (reason(a.tracking), reason(a.trusted))))
+    return [(what, why) for what, _, why in (text.partition(": ") for text in reasons)]
+
+
+def _moving_rows(a: Assessment) -> list[tuple[str, str]]:
+    if a.moving is None or a.trusted_moving is None:
+        return [("moving windows", a.moving_note or "")]
+    rows = [("moving windows", _windows_text(a, a.moving))]
+    if a.trusted_moving is not a.moving:
+        rows.append(("the same, trusted", _windows_text(a, a.trusted_moving)))
+    return rows
+
+
+def _moving_factors(a: Assessment, moving: MovingTracking) -> str:
     """P and Q of the windows, where others were chosen for the record."""
-    if a.factors is None or a.moving is None:
+    if a.factors is None or moving is not a.moving:
         return ""
-    s = a.moving.settings
+    s = moving.settings
     return f" at P = {s.data_decimation}, Q = {s.frequency_decimation}"
 
 
@@ -398,7 +489,7 @@ def _print_table_of_all(console: Console, assessments: Sequence[Assessment]) -> 
     table = Table(box=None, pad_edge=False)
     table.add_column("file", overflow="fold")
     table.add_column("target, measured", overflow="fold")
-    for name in ("amplitude", "delay ms", "at Hz", "rms error %"):
+    for name in ("amplitude", "delay ms", "trusted amplitude", "trusted delay ms", "at Hz", "rms error %"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("")
     for a in assessments:
@@ -409,13 +500,15 @@ def _print_table_of_all(console: Console, assessments: Sequence[Assessment]) -> 
         table.add_row(
             Text(a.file),
             Text(f"{a.target_name}, {a.measured_name}"),
-            f"{float(t.amplitude):.4f}",
-            f"{1e3 * float(t.delay_s):.3f}",
-            f"{float(t.equivalent_frequency_hz):.3g}",
+            _number(float(t.amplitude), ".4f", ""),
+            _number(1e3 * float(t.delay_s), ".3f", ""),
+            _estimate(float(a.trusted.amplitude), a.trusted.amplitude_interval),
+            _estimate(1e3 * float(a.trusted.delay_s), [1e3 * end for end in a.trusted.delay_interval_s]),
+            _number(float(t.equivalent_frequency_hz), ".3g", ""),
             f"{a.indices.rms_error_percent:.3g}",
             Text(remarks.strip(), style="bold red" if a.exceeded else "yellow"),
         )
     console.print(table)
     for a in assessments:
-        for text in (*a.exceeded, *a.warnings):
+        for text in (*a.exceeded, a.argument, *a.warnings):
             console.print(Text(f"{a.file}: ", style="yellow") + Text(text))

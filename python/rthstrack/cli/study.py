@@ -93,8 +93,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
                       f"{COMBINED[0]} {COMBINED[1]}, or every P with every Q where -P or -Q is given)")  # fmt: skip
     grid.add_argument("--windows", default=",".join(WINDOWS), metavar="LIST",
                       help="of boxcar, hann, hamming, blackman, flattop, tukey (default: %(default)s)")  # fmt: skip
-    grid.add_argument("--weight-powers", default=",".join(map(str, WEIGHT_POWERS)), metavar="LIST",
-                      help="bins weigh |target|^L, 1 to 16 (default: %(default)s)")  # fmt: skip
+    grid.add_argument("--weight-powers", metavar="LIST",
+                      help=f"bins weigh |target|^L, 1 to 16 (default: {','.join(map(str, WEIGHT_POWERS))}; "
+                      "2 for least_squares, which knows no other)")  # fmt: skip
     grid.add_argument("--tolerance", type=tolerance, metavar="X",
                       help="auto takes the largest P and Q that change amplitude and delay by at most this share "
                       f"({TOLERANCE}); with auto for one of them the other is 1")  # fmt: skip
@@ -135,7 +136,7 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
         q,
         args.combined and tuple(args.combined),
         _items(args.windows),
-        _numbers(args.weight_powers),
+        _weight_powers(args),
         args.estimator,
         args.decimator,
         args.detrend,
@@ -144,6 +145,9 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
         choose,
         args.tolerance or TOLERANCE,
         () if args.share is None else _several("share", _items(args.share)),
+        args.max_delay,
+        args.noise,
+        args.noise_ratio,
     ).checked()
     _make(args.output)
     pairs, failures = _read_all(args)
@@ -174,6 +178,12 @@ def _items(text: str) -> tuple[str, ...]:
 def _numbers(text: str) -> tuple[Any, ...]:
     """Whole numbers; what is none stays text, for the check to name."""
     return tuple(int(item) if item.removeprefix("-").isdecimal() else item for item in _items(text))
+
+
+def _weight_powers(args: argparse.Namespace) -> tuple[Any, ...]:
+    if args.weight_powers is not None:
+        return _numbers(args.weight_powers)
+    return (2,) if args.estimator == "least_squares" else WEIGHT_POWERS
 
 
 def _grid_list(text: str | None) -> tuple[Any, ...] | None:
