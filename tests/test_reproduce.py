@@ -123,11 +123,26 @@ def test_the_truth_of_the_experiment_is_the_residual_transfer_function(
     assert known is not None
     assert float(known[0].squeeze()) == pytest.approx(amplitude, abs=0.0005)
     assert 1e3 * float(known[1].squeeze()) == pytest.approx(delay_ms, abs=0.005)
-    (judged,) = done.estimators.values()
-    cell = judged.cell(source=f"experiment-{alpha_es}")
-    a, d = residual(alpha_es, cell.equivalent_frequency_hz)
-    assert cell.true_amplitude == pytest.approx(a, abs=round_off(1, 100))
-    assert cell.true_delay_s == pytest.approx(d, abs=1e-12)
+    assert set(done.estimators) == {"fei", "aligned", "least_squares"}
+    for judged in done.estimators.values():
+        cell = judged.cell(source=f"experiment-{alpha_es}")
+        a, d = residual(alpha_es, cell.equivalent_frequency_hz)
+        assert cell.true_amplitude == pytest.approx(a, abs=round_off(1, 100))
+        assert cell.true_delay_s == pytest.approx(d, abs=1e-12)
+
+
+@pytest.mark.parametrize("alpha_es", [15, 29, 45])
+def test_gain_and_delay_over_frequency_read_the_residual_transfer_function(done: Reproduction, alpha_es: int) -> None:
+    # method.md section 8: the exact residual at f_eq.
+    line = done.slopes[f"experiment-{alpha_es}"]
+    a, d = residual(alpha_es, line.equivalent_frequency_hz)
+    assert line.gain == pytest.approx(a, abs=0.001)
+    assert 1e3 * line.delay_s == pytest.approx(1e3 * d, abs=0.05)
+    # One gain and one delay for all frequencies weigh the target's velocity, so they speak for higher ones than f_eq.
+    cell = done.estimators["least_squares"].cell(source=f"experiment-{alpha_es}")
+    assert cell.amplitude == pytest.approx(cell.true_amplitude, abs=0.001)
+    assert 1e3 * abs(cell.delay_s - cell.true_delay_s) < 0.5
+    assert abs(cell.delay_s) <= abs(cell.true_delay_s) + 1e-9
 
 
 def test_the_experiment_lags_when_undercompensated_and_leads_when_overcompensated(done: Reproduction) -> None:

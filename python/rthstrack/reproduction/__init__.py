@@ -26,6 +26,7 @@ from rthstrack.reproduction.cases import (
 )
 from rthstrack.reproduction.paper_form import Reading
 from rthstrack.studies import Cell, Study, study
+from rthstrack.tracking import FrequencySlopes, frequency_slopes
 
 if TYPE_CHECKING:
     from rthstrack.reproduction.claims import Claim
@@ -36,8 +37,8 @@ __all__ = ["Reproduction", "reproduce"]
 #: How a reading was made: ours by bins or by the published filter, or the paper's form in SciPy with one of 3 filters.
 SPECTRAL, CHEBYSHEV, SCIPY, LOWERED, TRANSFER = "spectral", "chebyshev", "scipy", "lowered order", "transfer function"
 
-#: Estimators that judge the experiment; another of `Settings.estimator` joins here.
-ESTIMATORS = ("fei",)
+#: Estimators that judge the experiment, the published one first; another of `Settings.estimator` joins here.
+ESTIMATORS = ("fei", "aligned", "least_squares")
 
 _FILTERS = {
     SCIPY: paper_form.second_order_sections,
@@ -55,7 +56,7 @@ class Reproduction:
 
     runs, perfect: by case (`cases.CASES`), as the paper ran it, and with gain 1 and no delay. trials: tests beside the
     paper's. studies: ours, by decimator. weight_powers: CHY101-N at P = Q = 1 with l = 1 to 4. estimators: the
-    experiment at P = Q = 1 by each of `ESTIMATORS`. readings: of all routes, by (route, case, P, Q). decimation_s: time
+    experiment at P = Q = 1 by each of `ESTIMATORS`; slopes: its `frequency_slopes`. readings: of all routes, by (route, case, P, Q). decimation_s: time
     that decimating both signals takes, by (filter, P), in the nonlinear case of MU2035. seconds: what all this took.
     """
 
@@ -66,6 +67,7 @@ class Reproduction:
     studies: dict[str, Study]
     weight_powers: Study
     estimators: dict[str, Study]
+    slopes: dict[str, FrequencySlopes]
     readings: dict[tuple[str, str, int, int], Cell | Reading]
     decimation_s: dict[tuple[str, int], float]
     seconds: float
@@ -124,6 +126,7 @@ def reproduce(
         name: study(experiment, P=(1,), Q=(1,), windows=("boxcar",), estimator=name, timing=False)
         for name in ESTIMATORS
     }
+    slopes = {key: frequency_slopes(run.target, run.measured, run.rate_hz) for key, run in experiment.items()}
     result = Reproduction(
         used,
         runs,
@@ -132,6 +135,7 @@ def reproduce(
         studies,
         powers,
         estimators,
+        slopes,
         readings,
         decimation_s,
         time.perf_counter() - begun,
