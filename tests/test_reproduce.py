@@ -140,7 +140,7 @@ def test_gain_and_delay_over_frequency_read_the_residual_transfer_function(done:
     assert 1e3 * line.delay_s == pytest.approx(1e3 * d, abs=0.05)
     # One gain and one delay for all frequencies weigh the target's velocity, so they speak for higher ones than f_eq.
     cell = done.estimators["least_squares"].cell(source=f"experiment-{alpha_es}")
-    assert cell.amplitude == pytest.approx(cell.true_amplitude, abs=0.001)
+    assert cell.amplitude == pytest.approx(cell.true_amplitude, abs=0.002)
     assert 1e3 * abs(cell.delay_s - cell.true_delay_s) < 0.5
     assert abs(cell.delay_s) <= abs(cell.true_delay_s) + 1e-9
 

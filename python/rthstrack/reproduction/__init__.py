@@ -56,8 +56,9 @@ class Reproduction:
 
     runs, perfect: by case (`cases.CASES`), as the paper ran it, and with gain 1 and no delay. trials: tests beside the
     paper's. studies: ours, by decimator. weight_powers: CHY101-N at P = Q = 1 with l = 1 to 4. estimators: the
-    experiment at P = Q = 1 by each of `ESTIMATORS`; slopes: its `frequency_slopes`. readings: of all routes, by (route, case, P, Q). decimation_s: time
-    that decimating both signals takes, by (filter, P), in the nonlinear case of MU2035. seconds: what all this took.
+    experiment at P = Q = 1 by each of `ESTIMATORS`; slopes: its `frequency_slopes`. readings: of all routes, by (route,
+    case, P, Q). decimation_s: time that decimating both signals takes, by (filter, P), in the nonlinear case of MU2035.
+    seconds: what all this took.
     """
 
     records: dict[str, UsedRecord]
