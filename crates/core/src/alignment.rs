@@ -51,7 +51,7 @@ const SHORTENING: usize = 8;
 /// and where the target's velocity has at most this share of its energy above.
 const HIGH_SHARE: f64 = 0.05;
 /// A residual of this share of measured is as good as none: that of interpolation, of the last step and of round-off.
-const EXACT: f64 = 1e-12;
+const EXACT: f64 = 1e-11;
 
 /// The checked plan for windows of one length.
 pub(crate) struct Alignment {
@@ -190,6 +190,8 @@ struct Fit {
     /// The same less what noise on the target adds.
     clean: Products,
     residual: f64,
+    /// The share of measured that is explained, where the signals in the state do not tell.
+    goodness: Option<f64>,
 }
 
 impl Alignment {
@@ -293,7 +295,7 @@ impl Alignment {
         let (best, support) = self.best(state, view, start, peaks.peaks(), peaks.step, expected, false)?;
         if self.noise == Noise::Coloured {
             // Whitened by what the residual says of the noise, measured and target obey the same model.
-            self.leave_residual(state, &best, start, &support);
+            let goodness = Some(self.leave_residual(state, &best, start, &support));
             let noise = self.autoregression(state, start, &support);
             let p = noise.order;
             if p > 0 {
@@ -307,9 +309,11 @@ impl Alignment {
                 noise.whiten(&view.measured[part], &mut second[..n]);
                 let view = View { target: &first[..n], measured: &second[..n], origin: from + p };
                 let around = Peak { lag: best.tau, correlation: 1.0 };
-                let found = self
-                    .best(state, &view, start, &[around], peaks.step, None, false)
-                    .and_then(|(best, support)| self.complete(state, &view, start, &peaks, best, support));
+                let found =
+                    self.best(state, &view, start, &[around], peaks.step, None, false).and_then(|(best, support)| {
+                        // Whitening leaves less of the motion than of the noise; that says nothing of the tracking.
+                        self.complete(state, &view, start, &peaks, Fit { goodness, ..best }, support)
+                    });
                 state.whitened = [first, second];
                 return found;
             }
@@ -337,7 +341,8 @@ impl Alignment {
             // Other frequencies may have another delay: a part of a period away at most.
             let room = (0.2 * self.n_samples as f64 / peaks.cycles).clamp(2.0, self.search.reach() as f64);
             support = self.support(view, start, best.tau - room, best.tau + room);
-            best = self.refine(state, view, start, &support, best.tau, room, true)?;
+            let goodness = best.goodness;
+            best = Fit { goodness, ..self.refine(state, view, start, &support, best.tau, room, true)? };
         }
         self.check_delay(best.tau)?;
         Ok(self.finish(state, start, &support, &best, None))
@@ -517,6 +522,7 @@ impl Alignment {
                     products,
                     clean: score.clean,
                     residual: score.residual,
+                    goodness: None,
                 });
             }
             last = Some((now, score.value));
@@ -652,15 +658,18 @@ impl Alignment {
         usable.then_some(Score { value, slope, gain, clean, residual })
     }
 
-    /// measured becomes measured less the fit.
-    fn leave_residual(&self, state: &mut AlignmentState, fit: &Fit, start: usize, support: &Range<usize>) {
+    /// measured becomes measured less the fit; returns which share of it the fit explains, 1 - sum e^2 / sum (o - mean)^2.
+    fn leave_residual(&self, state: &mut AlignmentState, fit: &Fit, start: usize, support: &Range<usize>) -> f64 {
         let within = support.start - start..support.end - start;
         let Signals { measured, shifted, slope } = &mut state.signals;
+        let measured = &mut measured[within.clone()];
+        let total = sums::sum(measured);
+        let spread = sums::energy(measured) - total * total / measured.len() as f64;
         let (gain, step) = (fit.gain, fit.step);
-        let (shifted, slope) = (&shifted[within.clone()], &slope[within.clone()]);
-        for ((o, y), v) in measured[within].iter_mut().zip(shifted).zip(slope) {
+        for ((o, y), v) in measured.iter_mut().zip(&shifted[within.clone()]).zip(&slope[within]) {
             *o -= gain * (y - step * v);
         }
+        if spread > 0.0 { 1.0 - sums::energy(measured) / spread } else { f64::NAN }
     }
 
     /// The autoregression of the residual that stands in measured's place.
@@ -755,13 +764,8 @@ impl Alignment {
         fit: &Fit,
         averaged: Option<Averaged>,
     ) -> Tracking {
-        let within = support.start - start..support.end - start;
-        let judged = &state.signals.measured[within.clone()];
-        let (total, squares) = (sums::sum(judged), sums::energy(judged));
-        let spread = squares - total * total / judged.len() as f64;
-        self.leave_residual(state, fit, start, support);
-        let residual = sums::energy(&state.signals.measured[within.clone()]);
-        let goodness = if spread > 0.0 { 1.0 - residual / spread } else { f64::NAN };
+        let left = self.leave_residual(state, fit, start, support);
+        let goodness = fit.goodness.unwrap_or(left);
         if goodness.is_nan() || goodness < MIN_GOODNESS {
             return Tracking::undetermined(Reason::LowCoherence { goodness });
         }
@@ -783,7 +787,7 @@ impl Alignment {
         };
         match self.precision(state, start, support, fit, averaged) {
             None => tracking.without_interval(Reason::FewBins),
-            Some(precision) => self.with_precision(tracking, &precision, residual <= EXACT * squares),
+            Some(precision) => self.with_precision(tracking, &precision, 1.0 - left <= EXACT),
         }
     }
 
@@ -882,7 +886,7 @@ impl Alignment {
         let (delay_std, delay_reach) = (delay_std / self.rate_hz, delay_reach / self.rate_hz);
         // Wider than half a turn says nothing of the delay.
         if delay_reach * tracking.equivalent_frequency_hz >= 0.25 {
-            return Tracking::undetermined(Reason::LowCoherence { goodness: tracking.goodness });
+            return Tracking::undetermined(Reason::Uncertain { reach_s: delay_reach });
         }
         tracking.amplitude_std = gain_std;
         tracking.amplitude_interval = (tracking.amplitude - gain_reach, tracking.amplitude + gain_reach);

@@ -23,6 +23,11 @@ pub enum Reason {
         /// Share that follows.
         goodness: f64,
     },
+    /// The delay's interval is wider than half a turn of the motion.
+    Uncertain {
+        /// From the delay to either end of its interval, in seconds.
+        reach_s: f64,
+    },
     /// Two delays fit equally well.
     Ambiguous {
         /// One of them, in seconds.
@@ -77,6 +82,12 @@ impl fmt::Display for Reason {
                 f,
                 "not determined: only {:.0} % of measured follows target; is this the right pair?",
                 100.0 * goodness.max(0.0)
+            ),
+            Reason::Uncertain { reach_s } => write!(
+                f,
+                "not determined: noise leaves the delay uncertain by {:.3} ms either way, more than half a turn; \
+                 take a longer window or a band with less noise",
+                1e3 * reach_s
             ),
             Reason::Ambiguous { delay_s, other_s } => write!(
                 f,
