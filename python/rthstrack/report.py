@@ -660,13 +660,13 @@ def _key_numbers(a: Assessment) -> str:
         (
             "Amplitude A",
             _number("amplitude", amplitude, reason=reasons.get("amplitude")),
-            _beside(a, "amplitude") or "1 is perfect",
+            _beside(a, "amplitude", "1 is perfect"),
             _limit("limit_amplitude", "1 \N{PLUS-MINUS SIGN} ", abs(amplitude - 1), a.limits.amplitude),
         ),
         (
             "Delay d",
             _number("delay_s", delay_s, "ms", 1e3, reasons.get("delay_s")),
-            _beside(a, "delay_s") or (sense if math.isfinite(delay_s) else ""),
+            _beside(a, "delay_s", sense if math.isfinite(delay_s) else ""),
             _limit("limit_delay_s", "\N{PLUS-MINUS SIGN}", abs(delay_s), a.limits.delay_s, "ms", 1e3),
         ),
         (
@@ -688,12 +688,12 @@ def _key_numbers(a: Assessment) -> str:
     return f'<dl class="tiles">{tiles}</dl>{_index_tiles(a, target_role, measured_role, reasons)}'
 
 
-def _beside(a: Assessment, name: str) -> str:
-    """Which estimate the tile shows, its interval if it has one, and the trusted one with its own."""
+def _beside(a: Assessment, name: str, note: str) -> str:
+    """What the tile's number is, its interval if it has one, and the trusted one with its own."""
     t = a.trusted
     unit, factor = ("ms", 1e3) if name == "delay_s" else ("", 1.0)
     field = "delay_interval_s" if name == "delay_s" else "amplitude_interval"
-    parts = ["as published" if a.tracking.settings.estimator == "fei" else _ESTIMATORS[a.tracking.settings.estimator]]
+    parts = [f"{_ESTIMATORS[a.tracking.settings.estimator]}; {note}".removesuffix("; ")]
     if own := _interval(field, getattr(a.tracking, field), float(getattr(a.tracking, name)), unit, factor):
         parts.append(own)
     if t is not a.tracking:
