@@ -487,7 +487,7 @@ def evaluate(
     max_delay_s: "aligned" and "least_squares" look for delays and leads up to this, and a quarter of the record.
     noise, noise_ratio: of "least_squares" only. noise "coloured": both signals are whitened by an autoregression of
     what a first fit leaves, and fitted again. noise_ratio: standard deviation of the noise on target over that on
-    measured; above 0, total least squares.
+    measured; above 0, total least squares over the bins in which both stand clear of white noise.
     weights: also return the kept bins with their weights and spectra.
 
     delay_s > 0: measured lags. Raises SignalError for samples that cannot be judged, SettingError for settings.

@@ -14,7 +14,7 @@
 use std::ops::Range;
 
 use num_complex::Complex;
-use pulp::{Arch, NullaryFnOnce, Simd, WithSimd};
+use pulp::{Arch, Simd, WithSimd};
 
 use crate::error::Result;
 use crate::lag::{Peak, Peaks, Search, SearchState, View};
@@ -24,25 +24,34 @@ use crate::noise::{
 };
 use crate::reason::Reason;
 use crate::spectrum::{Bins, LANES, Scratch, Sink, Spectrum, SpectrumConfig};
-use crate::tracking::{Estimator, EvaluatorConfig, Noise, Tracking, delay, weigh};
+use crate::sums;
+use crate::tracking::{Estimator, EvaluatorConfig, Noise, Tracking, centroid, weigh};
 use crate::window::{Detrend, Window};
 
 /// Newton's steps at most.
 const MAX_STEPS: usize = 24;
 /// A step this short, in samples, is the last: what it leaves is its square.
 const LAST_STEP: f64 = 1e-4;
+/// The same where the slope has been measured, noise and all.
+const LAST_SECANT_STEP: f64 = 1e-2;
 /// Fewest samples that are judged.
 const MIN_SUPPORT: usize = 16;
-/// Fewest cycles of the target in the window.
-const MIN_CYCLES: f64 = 0.5;
+/// Fewest cycles of the target in the window: more than half a wave, whose delay cannot be told from an offset.
+const MIN_CYCLES: f64 = 0.6;
 /// Least share of measured that must follow the target.
 const MIN_GOODNESS: f64 = 0.1;
 /// Two delays fit equally well if the likelihood of one is below exp(10) times that of the other.
 const LOG_ODDS: f64 = 10.0;
 /// Energy of the target over its noise from which a few bins count: of noise alone it happens once in 10,000.
 const CLEAR: f64 = 3.0;
-/// A residual of this share of measured is as good as none: that of interpolation and round-off.
-const EXACT: f64 = 1e-14;
+/// Up to this frequency, and the next power of two of it in the rate, precision is looked at where that is enough;
+const LOW_HZ: f64 = 32.0;
+/// where it shortens the transforms by at least this;
+const SHORTENING: usize = 8;
+/// and where the target's velocity has at most this share of its energy above.
+const HIGH_SHARE: f64 = 0.05;
+/// A residual of this share of measured is as good as none: that of interpolation, of the last step and of round-off.
+const EXACT: f64 = 1e-12;
 
 /// The checked plan for windows of one length.
 pub(crate) struct Alignment {
@@ -55,14 +64,68 @@ pub(crate) struct Alignment {
     weight_power: u32,
     detrend: Detrend,
     window: Option<Vec<f64>>,
+    /// sum w^2 and sum w^4 of it.
+    moments: (f64, f64),
     search: Search,
-    spectrum: Spectrum,
-    correction: Option<Vec<f64>>,
+    kept: Grid,
+    /// Lower bins only, for the precision of what is estimated from all of them while the target moves slowly.
+    low: Option<Grid>,
     /// All bins are kept, so that sums over samples serve.
     in_time: bool,
-    /// cos of the kept bins' frequencies, in radians a sample.
-    cosines: Vec<f64>,
     arch: Arch,
+}
+
+/// Bins and how to come to them.
+struct Grid {
+    spectrum: Spectrum,
+    /// Samples that are averaged before the transform.
+    step: usize,
+    /// What makes good the droop of the cascade, or of the averages.
+    correction: Option<Vec<f64>>,
+    /// cos of the bins' frequencies, in radians a sample.
+    cosines: Vec<f64>,
+}
+
+impl Grid {
+    fn new(config: SpectrumConfig) -> Result<Self> {
+        let spectrum = Spectrum::new(config)?;
+        let cosines = radians(&spectrum, config.rate_hz).map(f64::cos).collect();
+        Ok(Self { step: 1, correction: spectrum.correction(), spectrum, cosines })
+    }
+
+    /// The bins up to the rate over 2 `factor`, from averages of a quarter as many samples: what aliases onto the highest of
+    /// them is held to 2 % of its energy, which serves for a variance.
+    fn low(config: SpectrumConfig, factor: usize) -> Result<Self> {
+        let step = factor / 4;
+        let rate_hz = config.rate_hz / step as f64;
+        let band_hz = Some((0.0, config.rate_hz / (2 * factor) as f64));
+        let spectrum =
+            Spectrum::new(SpectrumConfig { n_samples: config.n_samples.div_ceil(step), rate_hz, band_hz, ..config })?;
+        let gain = |w: f64| (0.5 * w * step as f64).sin() / (0.5 * w).sin();
+        let correction = Some(radians(&spectrum, config.rate_hz).map(|w| (step * step) as f64 / gain(w)).collect());
+        let cosines = radians(&spectrum, config.rate_hz).map(f64::cos).collect();
+        Ok(Self { spectrum, step, correction, cosines })
+    }
+
+    /// Length of the zero-padded samples over Q.
+    fn folded_len(&self) -> f64 {
+        (self.step * self.spectrum.folded_len()) as f64
+    }
+
+    fn transform(&self, scratch: &mut Scratch, samples: &[f64], averages: &mut [f64], bins: &mut [Complex<f64>]) {
+        if self.step == 1 {
+            return self.spectrum.transform_one(scratch, samples, None, bins);
+        }
+        sums::block_means(samples, self.step, averages);
+        self.spectrum.transform_one(scratch, averages, None, bins);
+    }
+}
+
+/// Frequencies of the kept bins, in radians a sample of `rate_hz`.
+fn radians(spectrum: &Spectrum, rate_hz: f64) -> impl Iterator<Item = f64> + use<> {
+    let bin = 2.0 * std::f64::consts::PI * spectrum.delta_f_hz() / rate_hz;
+    let first = spectrum.first();
+    (first..first + spectrum.n_bins()).map(move |k| k as f64 * bin)
 }
 
 /// Its buffers.
@@ -73,9 +136,9 @@ pub(crate) struct AlignmentState {
     /// Transforms of displacement, velocity, and measured or residual.
     bins: [Vec<Complex<f64>>; 3],
     scratch: Scratch,
+    /// Of the lower bins, and room for averages.
+    low: Option<(Scratch, Vec<f64>)>,
     spread: SpreadState,
-    /// Of the autoregression.
-    work: Vec<f64>,
     /// Target and measured, less what an autoregression predicts of the noise.
     whitened: [Vec<f64>; 2],
     weighting: Weighting,
@@ -134,7 +197,7 @@ impl Alignment {
     pub(crate) fn new(n_samples: usize, rate_hz: f64, config: &EvaluatorConfig) -> Result<Self> {
         let EvaluatorConfig { data_decimation, frequency_decimation, band_hz, .. } = *config;
         // What is done to the samples is done here, over those that are judged.
-        let spectrum = Spectrum::new(SpectrumConfig {
+        let plan = SpectrumConfig {
             n_samples,
             rate_hz,
             data_decimation,
@@ -142,12 +205,13 @@ impl Alignment {
             window: Window::Boxcar,
             detrend: Detrend::None,
             band_hz,
-        })?;
+        };
         let undecimated = data_decimation == 1 && frequency_decimation == 1 && band_hz.is_none();
-        let in_time = config.estimator == Estimator::LeastSquares && undecimated && config.noise_ratio == 0.0;
-        let radians = 2.0 * std::f64::consts::PI * spectrum.delta_f_hz() / rate_hz;
-        let first = spectrum.first();
-        let cosines: Vec<f64> = (0..spectrum.n_bins()).map(|k| ((first + k) as f64 * radians).cos()).collect();
+        let exact_target = config.noise_ratio == 0.0;
+        let window = config.window.coefficients(n_samples);
+        let low = 1usize << (rate_hz / (2.0 * LOW_HZ)).max(1.0).log2() as u32;
+        let low = (undecimated && exact_target && low >= SHORTENING && n_samples >= 2 * low * low)
+            .then(|| Grid::low(plan, low));
         Ok(Self {
             estimator: config.estimator,
             n_samples,
@@ -157,12 +221,12 @@ impl Alignment {
             noise_ratio: config.noise_ratio,
             weight_power: config.weight_power,
             detrend: config.detrend,
-            window: config.window.coefficients(n_samples),
+            moments: window.as_deref().map_or((0.0, 0.0), moments),
+            window,
             search: Search::new(n_samples, config.max_delay_s * rate_hz),
-            correction: spectrum.correction(),
-            spectrum,
-            in_time,
-            cosines,
+            kept: Grid::new(plan)?,
+            low: low.transpose()?,
+            in_time: config.estimator == Estimator::LeastSquares && undecimated && exact_target,
             arch: Arch::new(),
         })
     }
@@ -170,14 +234,14 @@ impl Alignment {
     pub(crate) fn state(&self) -> AlignmentState {
         let n = self.n_samples;
         let whitened = if self.noise == Noise::Coloured { self.longest_view() } else { 0 };
-        let weighted = if self.noise_ratio > 0.0 { self.spectrum.n_bins() } else { 0 };
+        let weighted = if self.noise_ratio > 0.0 { self.kept.spectrum.n_bins() } else { 0 };
         AlignmentState {
             search: self.search.state(),
             signals: Signals { measured: vec![0.0; n], shifted: vec![0.0; n], slope: vec![0.0; n] },
-            bins: std::array::from_fn(|_| self.spectrum.packed()),
-            scratch: self.spectrum.scratch(),
-            spread: SpreadState::new(self.spectrum.n_bins()),
-            work: vec![0.0; 2 * n],
+            bins: std::array::from_fn(|_| self.kept.spectrum.packed()),
+            scratch: self.kept.spectrum.scratch(),
+            low: self.low.as_ref().map(|low| (low.spectrum.scratch(), vec![0.0; n.div_ceil(low.step)])),
+            spread: SpreadState::new(self.kept.spectrum.n_bins()),
             whitened: std::array::from_fn(|_| vec![0.0; whitened]),
             weighting: Weighting {
                 weights: vec![0.0; weighted],
@@ -290,13 +354,13 @@ impl Alignment {
     fn weigh_bins(&self, state: &mut AlignmentState, view: &View<'_>, start: usize, lag: f64) {
         let support = self.support(view, start, lag - 1.0, lag + 1.0);
         state.weighting.weights.fill(1.0);
-        state.weighting.refresh(self.correction.as_deref(), &self.cosines);
+        state.weighting.refresh(self.kept.correction.as_deref(), &self.kept.cosines);
         if support.len() < MIN_SUPPORT {
             return;
         }
         self.place_measured(state, view, start, &support);
         self.place_target(state, view, start, &support, lag);
-        self.spectrum.transform_one(&mut state.scratch, &state.signals.measured, None, &mut state.bins[MEASURED]);
+        self.kept.spectrum.transform_one(&mut state.scratch, &state.signals.measured, None, &mut state.bins[MEASURED]);
         let products = self.products_in_bins(state);
         let Some(score) = self.score(&products, &Taps::at(fraction(lag).1), &state.weighting.correlation) else {
             return;
@@ -307,15 +371,16 @@ impl Alignment {
         let mut energies = Energies {
             gain: score.gain,
             ratio: self.noise_ratio,
-            first: self.spectrum.first(),
-            correction: self.correction.as_deref(),
+            first: self.kept.spectrum.first(),
+            correction: self.kept.correction.as_deref(),
             energy: &mut weighting.weights,
             residual: &mut weighting.factors,
         };
-        self.spectrum.visit_pair([y, o], &mut energies);
-        let bins_per_piece = (self.spectrum.folded_len() as f64 * fourths / (window_power * window_power)).max(1.0);
+        self.kept.spectrum.visit_pair([y, o], &mut energies);
+        let bins_per_piece =
+            (self.kept.spectrum.folded_len() as f64 * fourths / (window_power * window_power)).max(1.0);
         weighting.learn(cell_width(bins_per_piece), 1.0 / (self.noise_ratio.powi(-2) + score.gain * score.gain));
-        weighting.refresh(self.correction.as_deref(), &self.cosines);
+        weighting.refresh(self.kept.correction.as_deref(), &self.kept.cosines);
     }
 
     /// Longest stretch of record that a window needs.
@@ -349,7 +414,9 @@ impl Alignment {
         let support = around(lags().fold(f64::INFINITY, f64::min), lags().fold(f64::NEG_INFINITY, f64::max));
         let mut fits: [Option<Fit>; crate::lag::MAX_PEAKS] = [None; crate::lag::MAX_PEAKS];
         for (slot, peak) in fits.iter_mut().zip(peaks) {
-            *slot = self.refine(state, view, start, &support, peak.lag, room, in_bins).ok();
+            // Twice, so that no step is left that the residual would show.
+            let found = self.refine(state, view, start, &support, peak.lag, room, in_bins);
+            *slot = found.and_then(|f| self.refine(state, view, start, &support, f.tau, 1.0, in_bins)).ok();
         }
         let Some(best) = fits.iter().flatten().copied().min_by(|a, b| a.residual.total_cmp(&b.residual)) else {
             return Err(Reason::NoConvergence);
@@ -405,7 +472,12 @@ impl Alignment {
         }
         self.place_measured(state, view, start, support);
         if in_bins {
-            self.spectrum.transform_one(&mut state.scratch, &state.signals.measured, None, &mut state.bins[MEASURED]);
+            self.kept.spectrum.transform_one(
+                &mut state.scratch,
+                &state.signals.measured,
+                None,
+                &mut state.bins[MEASURED],
+            );
         }
         let (low, high) = (tau - room, tau + room);
         // Where the score is known to be positive (the delay is larger) and negative.
@@ -426,18 +498,18 @@ impl Alignment {
                 above = now
             }
             // The secant through the last two places, where it is of the size that the model predicts.
-            let mut slope = score.slope;
+            let (mut slope, mut last_step) = (score.slope, LAST_STEP);
             if let Some((tau, value)) = last
                 && (now - tau).abs() > 1e-3
             {
                 let secant = (value - score.value) / (now - tau);
                 if secant > 0.02 * slope && secant < 4.0 * slope {
-                    slope = secant;
+                    (slope, last_step) = (secant, LAST_SECANT_STEP);
                 }
             }
             let step = score.value / slope;
-            if step.abs() < LAST_STEP || above - below < LAST_STEP {
-                let step = step.clamp(-LAST_STEP, LAST_STEP);
+            if step.abs() < last_step || above - below < LAST_STEP {
+                let step = step.clamp(-last_step, last_step);
                 return Ok(Fit {
                     tau: now + step,
                     step,
@@ -504,11 +576,11 @@ impl Alignment {
     fn products_in_bins(&self, state: &mut AlignmentState) -> Products {
         let AlignmentState { signals, bins: [y, v, o], scratch, weighting, .. } = state;
         let correction = self.factors(weighting);
-        self.spectrum.transform_one(scratch, &signals.shifted, None, y);
-        self.spectrum.transform_one(scratch, &signals.slope, None, v);
+        self.kept.spectrum.transform_one(scratch, &signals.shifted, None, y);
+        self.kept.spectrum.transform_one(scratch, &signals.slope, None, v);
         let pair = |a: &[Complex<f64>], b: &[Complex<f64>]| {
-            let mut cross = Cross { correction, first: self.spectrum.first(), ..Cross::default() };
-            self.spectrum.visit_pair([a, b], &mut cross);
+            let mut cross = Cross { correction, first: self.kept.spectrum.first(), ..Cross::default() };
+            self.kept.spectrum.visit_pair([a, b], &mut cross);
             let total = |lanes: [f64; LANES]| lanes.iter().sum::<f64>();
             (total(cross.first_squared), total(cross.product), total(cross.second_squared))
         };
@@ -518,7 +590,7 @@ impl Alignment {
 
     /// What the bins are multiplied with before they are summed.
     fn factors<'a>(&'a self, weighting: &'a Weighting) -> Option<&'a [f64]> {
-        if self.noise_ratio > 0.0 { Some(&weighting.factors) } else { self.correction.as_deref() }
+        if self.noise_ratio > 0.0 { Some(&weighting.factors) } else { self.kept.correction.as_deref() }
     }
 
     /// Detrends and windows `signal` over `within`.
@@ -584,24 +656,26 @@ impl Alignment {
     fn leave_residual(&self, state: &mut AlignmentState, fit: &Fit, start: usize, support: &Range<usize>) {
         let within = support.start - start..support.end - start;
         let Signals { measured, shifted, slope } = &mut state.signals;
+        let (gain, step) = (fit.gain, fit.step);
         let (shifted, slope) = (&shifted[within.clone()], &slope[within.clone()]);
         for ((o, y), v) in measured[within].iter_mut().zip(shifted).zip(slope) {
-            *o -= fit.gain * (y - fit.step * v);
+            *o -= gain * (y - step * v);
         }
     }
 
     /// The autoregression of the residual that stands in measured's place.
-    fn autoregression(&self, state: &mut AlignmentState, start: usize, support: &Range<usize>) -> Autoregression {
+    fn autoregression(&self, state: &AlignmentState, start: usize, support: &Range<usize>) -> Autoregression {
         let within = support.start - start..support.end - start;
         let (squares, fourths) = self.window_moments(&within);
-        Autoregression::fit(self.arch, &state.signals.measured[within], squares * squares / fourths, &mut state.work)
+        Autoregression::fit(&state.signals.measured[within], squares * squares / fourths)
     }
 
     /// sum w^2 and sum w^4 over the judged samples.
     fn window_moments(&self, within: &Range<usize>) -> (f64, f64) {
         match &self.window {
             None => (within.len() as f64, within.len() as f64),
-            Some(w) => w[within.clone()].iter().fold((0.0, 0.0), |(s, q), w| (s + w * w, q + w * w * w * w)),
+            Some(_) if within.len() == self.n_samples => self.moments,
+            Some(window) => moments(&window[within.clone()]),
         }
     }
 
@@ -616,49 +690,51 @@ impl Alignment {
     ) -> std::result::Result<Tracking, Reason> {
         let from = fit.tau;
         let mut last: Option<(f64, f64)> = None;
-        // Re sum Y' conj Y / sum |Y|^2: how the amplitude changes with the delay.
-        let mut growth = 0.0;
-        self.spectrum.transform_one(&mut state.scratch, &state.signals.measured, None, &mut state.bins[MEASURED]);
+        // Re sum Y' conj Y / sum |Y|^2, by Parseval: how the amplitude changes with the delay.
+        let growth = fit.products.yv / fit.products.yy;
+        self.kept.spectrum.transform_one(&mut state.scratch, &state.signals.measured, None, &mut state.bins[MEASURED]);
         for _ in 0..MAX_STEPS {
             let tau = fit.tau;
             self.place_target(state, view, start, support, tau);
             let AlignmentState { signals, bins: [y, v, o], scratch, .. } = &mut *state;
-            self.spectrum.transform_one(scratch, &signals.shifted, None, y);
+            self.kept.spectrum.transform_one(scratch, &signals.shifted, None, y);
             let sums = |a: &[Complex<f64>], b: &[Complex<f64>]| {
-                weigh(&self.spectrum, self.correction.as_deref(), self.weight_power, [a, b])
+                weigh(&self.kept.spectrum, self.kept.correction.as_deref(), self.weight_power, [a, b])
             };
             let found = sums(y, o);
             let fei = found.cross / found.power;
-            let quarter_turn = 0.25 * found.power / found.moment * self.rate_hz / self.spectrum.delta_f_hz();
+            let equivalent_frequency_hz = found.moment / found.power * self.kept.spectrum.delta_f_hz();
+            let per_sample = equivalent_frequency_hz / self.rate_hz;
             let phase = fei.arg();
-            let mut slope =
-                2.0 * std::f64::consts::PI * found.moment / found.power * self.spectrum.delta_f_hz() / self.rate_hz;
+            let mut slope = 2.0 * std::f64::consts::PI * per_sample;
+            // A slope that is known to the second order makes a longer step the last.
+            let mut last_step = LAST_STEP;
             match last {
-                Some((before, value)) if (tau - before).abs() > 1e-9 => {
+                Some((before, value)) => {
                     let secant = (phase - value) / (tau - before);
                     if secant > 0.1 * slope && secant < 10.0 * slope {
                         slope = secant;
                     }
                 }
-                _ if self.weight_power == 2 => {
+                None if self.weight_power == 2 => {
                     // y moves by -y' a sample: d arg(sum O conj Y) = -Im(sum O conj Y' / sum O conj Y).
-                    self.spectrum.transform_one(scratch, &signals.slope, None, v);
+                    self.kept.spectrum.transform_one(scratch, &signals.slope, None, v);
                     let exact = -(sums(v, o).cross / found.cross).im;
                     if exact > 0.0 {
                         slope = exact;
+                        last_step = LAST_SECANT_STEP;
                     }
-                    growth = sums(y, v).cross.re / found.power;
                 }
-                _ => {}
+                None => {}
             }
             let step = -phase / slope;
-            if !step.is_finite() || (tau + step - from).abs() > quarter_turn {
+            if !step.is_finite() || (tau + step - from).abs() * per_sample > 0.25 {
                 return Err(Reason::NoConvergence);
             }
-            if step.abs() < LAST_STEP {
-                fit = Fit { tau: tau + step, step, gain: fei.norm(), ..fit };
-                let mut tracking =
-                    self.finish(state, start, support, &fit, Some(Averaged { power: found.power, slope, growth }));
+            if step.abs() < last_step {
+                fit = Fit { tau: tau + step, step, gain: fei.norm() * (1.0 + growth * step), ..fit };
+                let averaged = Averaged { equivalent_frequency_hz, power: found.power, slope, growth };
+                let mut tracking = self.finish(state, start, support, &fit, Some(averaged));
                 if self.weight_power != 2 && tracking.reason.is_none() {
                     tracking = tracking.without_interval(Reason::WeightPower);
                 }
@@ -680,67 +756,90 @@ impl Alignment {
         averaged: Option<Averaged>,
     ) -> Tracking {
         let within = support.start - start..support.end - start;
-        let n_judged = within.len() as f64;
-        let (sum, squares) =
-            state.signals.measured[within.clone()].iter().fold((0.0, 0.0), |(s, q), v| (s + v, q + v * v));
-        let spread = squares - sum * sum / n_judged;
+        let judged = &state.signals.measured[within.clone()];
+        let (total, squares) = (sums::sum(judged), sums::energy(judged));
+        let spread = squares - total * total / judged.len() as f64;
         self.leave_residual(state, fit, start, support);
-        let residual: f64 = state.signals.measured[within.clone()].iter().map(|v| v * v).sum();
+        let residual = sums::energy(&state.signals.measured[within.clone()]);
         let goodness = if spread > 0.0 { 1.0 - residual / spread } else { f64::NAN };
-        let noise = self.autoregression(state, start, support);
-        let AlignmentState {
-            signals: Signals { measured, shifted, slope },
-            bins: [y, v, e],
-            scratch,
-            spread: cells,
-            weighting,
-            ..
-        } = state;
-        // At zero frequency there is no bin, but there may be much of the target.
-        let zero = |x: &[f64]| x[within.clone()].iter().sum::<f64>();
-        self.spectrum.transform_one(scratch, measured, None, e);
-        if self.in_time {
-            self.spectrum.transform_one(scratch, shifted, None, y);
-        }
-        let sums = weigh(&self.spectrum, self.factors(weighting), self.weight_power, [y, e]);
-        let f_eq = sums.moment / sums.power * self.spectrum.delta_f_hz();
-        let delay_s = fit.tau / self.rate_hz;
-        let phase_rad = -2.0 * std::f64::consts::PI * f_eq * delay_s;
-        let mut tracking = Tracking {
-            fei: Complex::from_polar(fit.gain, phase_rad),
-            amplitude: fit.gain,
-            phase_rad: 0.0 + phase_rad,
-            delay_s,
-            equivalent_frequency_hz: f_eq,
-            goodness,
-            ..Tracking::undetermined(Reason::Still)
-        };
-        tracking.reason = None;
-        debug_assert!((delay(phase_rad, f_eq) - delay_s).abs() <= 1e-9 * delay_s.abs() || !delay_s.is_finite());
         if goodness.is_nan() || goodness < MIN_GOODNESS {
             return Tracking::undetermined(Reason::LowCoherence { goodness });
         }
+        let f_eq = match averaged {
+            Some(averaged) => averaged.equivalent_frequency_hz,
+            None => self.equivalent_frequency_hz(state),
+        };
+        let delay_s = fit.tau / self.rate_hz;
+        let phase_rad = 0.0 - 2.0 * std::f64::consts::PI * f_eq * delay_s;
+        let tracking = Tracking {
+            fei: Complex::from_polar(fit.gain, phase_rad),
+            amplitude: fit.gain,
+            phase_rad,
+            delay_s,
+            equivalent_frequency_hz: f_eq,
+            goodness,
+            reason: None,
+            ..Tracking::undetermined(Reason::Still)
+        };
+        match self.precision(state, start, support, fit, averaged) {
+            None => tracking.without_interval(Reason::FewBins),
+            Some(precision) => self.with_precision(tracking, &precision, residual <= EXACT * squares),
+        }
+    }
+
+    /// Eq 7 of the shifted target that stands in the state.
+    fn equivalent_frequency_hz(&self, state: &mut AlignmentState) -> f64 {
+        let AlignmentState { signals, bins: [y, ..], scratch, weighting, .. } = state;
+        if self.in_time {
+            self.kept.spectrum.transform_one(scratch, &signals.shifted, None, y);
+        }
+        let (power, moment) = centroid(&self.kept.spectrum, self.factors(weighting), y);
+        moment / power * self.kept.spectrum.delta_f_hz()
+    }
+
+    /// How precise a fit is whose target and residual stand in the state.
+    fn precision(
+        &self,
+        state: &mut AlignmentState,
+        start: usize,
+        support: &Range<usize>,
+        fit: &Fit,
+        averaged: Option<Averaged>,
+    ) -> Option<Precision> {
+        let within = support.start - start..support.end - start;
+        let noise = self.autoregression(state, start, support);
+        let AlignmentState {
+            signals: Signals { measured, shifted, slope }, bins, scratch, low, spread, weighting, ..
+        } = state;
+        let slow = |low: &Grid| {
+            let share = 2.0 * (std::f64::consts::PI / (8 * low.step) as f64).sin();
+            let velocity = &slope[within.clone()];
+            sums::step_energy(velocity) <= HIGH_SHARE * share * share * sums::energy(velocity)
+        };
+        let (grid, scratch, averages) = match (&self.low, low) {
+            (Some(grid), Some((scratch, averages))) if slow(grid) => (grid, scratch, averages.as_mut_slice()),
+            _ => (&self.kept, scratch, &mut [][..]),
+        };
+        let spectrum = &grid.spectrum;
+        let [y, v, e] = bins.each_mut().map(|b| &mut b[..spectrum.packed_len()]);
+        grid.transform(scratch, measured, averages, e);
         // The estimate is a sum over w (w y), so the noise is seen through the window twice.
-        if self.window.is_some() {
-            for (signal, bins) in [(&mut *shifted, &mut *y), (&mut *slope, &mut *v)] {
-                self.taper(&mut signal[within.clone()], &within);
-                self.spectrum.transform_one(scratch, signal, None, bins);
-            }
-        } else if self.in_time {
-            self.spectrum.transform_one(scratch, slope, None, v);
+        for (signal, bins) in [(&mut *shifted, &mut *y), (&mut *slope, &mut *v)] {
+            self.taper(&mut signal[within.clone()], &within);
+            grid.transform(scratch, signal, averages, bins);
         }
         let (window_power, fourths) = self.window_moments(&within);
-        let folded = self.spectrum.folded_len() as f64;
+        let folded = grid.folded_len();
         let sampling = Sampling {
             window_power,
             bins_per_piece: (folded * fourths / (window_power * window_power)).max(1.0),
-            scale: 0.5 * folded.max(n_judged),
+            scale: 0.5 * folded.max(within.len() as f64),
         };
         // Sums over samples are 2 / n times those over bins.
-        let to_bins = if self.in_time { 0.5 * self.spectrum.fft_len() as f64 } else { 1.0 };
+        let to_bins = if self.in_time { 0.5 * folded } else { 1.0 };
         let influence = match averaged {
             // The parts of the noise in phase with the target and a quarter turn from it are independent.
-            Some(Averaged { power, slope, growth }) => Influence {
+            Some(Averaged { power, slope, growth, .. }) => Influence {
                 gain: [(1.0 + (growth / slope).powi(2)).sqrt() / power, 0.0],
                 delay: [1.0 / (power * fit.gain * slope), 0.0],
                 leverage: [2.0 / power, 0.0, 0.0],
@@ -755,24 +854,23 @@ impl Alignment {
                 }
             }
         };
-        let first = self.spectrum.first();
         let noisy_target = (self.noise_ratio > 0.0).then(|| NoisyTarget {
             weights: &weighting.weights,
             share: fit.gain / (self.noise_ratio.powi(-2) + fit.gain * fit.gain),
         });
-        let correction = self.correction.as_deref();
+        let correction = grid.correction.as_deref();
+        let first = spectrum.first();
         let mut spread =
-            Spread::new(cells, first, &self.cosines, correction, &noise, influence, sampling, noisy_target);
-        self.spectrum.visit_pair([y, v], &mut spread);
+            Spread::new(spread, first, &grid.cosines, correction, &noise, influence, sampling, noisy_target);
+        spectrum.visit_pair([y, v], &mut spread);
         spread.residual_next();
-        self.spectrum.visit_pair([y, e], &mut spread);
+        spectrum.visit_pair([y, e], &mut spread);
         if self.in_time {
+            // At zero frequency there is no bin, but there may be much of the target.
+            let zero = |x: &[f64]| sums::sum(&x[within.clone()]);
             spread.zero_frequency(zero(shifted), zero(slope), zero(measured));
         }
-        match spread.precision(within.len()) {
-            None => tracking.without_interval(Reason::FewBins),
-            Some(precision) => self.with_precision(tracking, &precision, residual <= EXACT * squares),
-        }
+        spread.precision(within.len())
     }
 
     fn with_precision(&self, mut tracking: Tracking, precision: &Precision, exact: bool) -> Tracking {
@@ -783,7 +881,7 @@ impl Alignment {
         let Precision { gain_std, gain_reach, delay_std, delay_reach, .. } = *precision;
         let (delay_std, delay_reach) = (delay_std / self.rate_hz, delay_reach / self.rate_hz);
         // Wider than half a turn says nothing of the delay.
-        if !(delay_reach * tracking.equivalent_frequency_hz < 0.25) {
+        if delay_reach * tracking.equivalent_frequency_hz >= 0.25 {
             return Tracking::undetermined(Reason::LowCoherence { goodness: tracking.goodness });
         }
         tracking.amplitude_std = gain_std;
@@ -807,6 +905,7 @@ impl Alignment {
 /// What the precision of a weighted average depends on.
 #[derive(Debug, Clone, Copy)]
 struct Averaged {
+    equivalent_frequency_hz: f64,
     /// sum |Y|^2 over the bins.
     power: f64,
     /// Of the phase over the delay, in radians a sample.
@@ -859,6 +958,11 @@ impl Weighting {
     }
 }
 
+/// sum w^2 and sum w^4
+fn moments(window: &[f64]) -> (f64, f64) {
+    (sums::energy(window), sums::fourths(window))
+}
+
 /// Zeroes what lies outside `within`.
 fn clear_around(signal: &mut [f64], within: &Range<usize>) {
     signal[..within.start].fill(0.0);
@@ -890,37 +994,34 @@ impl WithSimd for Shift<'_> {
     }
 }
 
-/// All inner products in one pass.
+/// All inner products in one pass, compiled for the processor at hand.
 struct Multiply<'a> {
     shifted: &'a [f64],
     slope: &'a [f64],
     measured: &'a [f64],
 }
 
-impl NullaryFnOnce for Multiply<'_> {
+impl WithSimd for Multiply<'_> {
     type Output = Products;
 
     #[inline(always)]
-    fn call(self) -> Products {
-        const WIDE: usize = 8;
-        let mut lanes = [[0.0; WIDE]; 6];
-        let n = self.shifted.len() / WIDE * WIDE;
-        let mut add = |i: usize, y: f64, v: f64, o: f64| {
-            for (lane, term) in lanes.iter_mut().zip([y * y, y * v, v * v, o * y, o * v, o * o]) {
-                lane[i] += term;
-            }
-        };
-        for ((y, v), o) in
-            self.shifted.chunks_exact(WIDE).zip(self.slope.chunks_exact(WIDE)).zip(self.measured.chunks_exact(WIDE))
-        {
-            for i in 0..WIDE {
-                add(i, y[i], v[i], o[i]);
+    fn with_simd<S: Simd>(self, simd: S) -> Products {
+        let (ys, y_rest) = S::as_simd_f64s(self.shifted);
+        let (vs, v_rest) = S::as_simd_f64s(self.slope);
+        let (os, o_rest) = S::as_simd_f64s(self.measured);
+        let mut lanes = [simd.splat_f64s(0.0); 6];
+        for ((y, v), o) in ys.iter().zip(vs).zip(os) {
+            for (lane, (a, b)) in lanes.iter_mut().zip([(y, y), (y, v), (v, v), (o, y), (o, v), (o, o)]) {
+                *lane = simd.mul_add_e_f64s(*a, *b, *lane);
             }
         }
-        for i in n..self.shifted.len() {
-            add(i - n, self.shifted[i], self.slope[i], self.measured[i]);
+        let mut total = lanes.map(|lane| simd.reduce_sum_f64s(lane));
+        for ((y, v), o) in y_rest.iter().zip(v_rest).zip(o_rest) {
+            for (sum, term) in total.iter_mut().zip([y * y, y * v, v * v, o * y, o * v, o * o]) {
+                *sum += term;
+            }
         }
-        let [yy, yv, vv, oy, ov, oo] = lanes.map(|lane| lane.iter().sum());
+        let [yy, yv, vv, oy, ov, oo] = total;
         Products { yy, yv, vv, oy, ov, oo }
     }
 }

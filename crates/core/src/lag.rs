@@ -11,6 +11,7 @@
 use pulp::{Arch, NullaryFnOnce};
 
 use crate::pair::Pair;
+use crate::sums;
 use crate::window::Detrend;
 
 /// Averaging may cost this share of the target's energy.
@@ -64,7 +65,7 @@ pub(crate) struct Peaks {
     pub(crate) lowest: f64,
     /// Samples from one lag looked at to the next.
     pub(crate) step: usize,
-    /// Cycles that the target moves through in the window, a straight line taken out: its velocity over its displacement.
+    /// Cycles that the target moves through in the window.
     pub(crate) cycles: f64,
 }
 
@@ -126,44 +127,39 @@ impl Search {
             return None;
         }
         let SearchState { target, measured, correlations } = state;
-        let (first, last) = (from - self.reach - view.origin, to + self.reach - view.origin);
-        let (mut n_target, mut n) = (last - first, to - from);
-        let asked = &view.target[first..last];
-        copy_less_line(asked, &asked[self.reach..self.reach + n], self.reach, &mut target[..n_target]);
+        let asked = &view.target[from - self.reach - view.origin..to + self.reach - view.origin];
         let answered = &view.measured[from - view.origin..to - view.origin];
-        copy_less_line(answered, answered, 0, &mut measured[..n]);
-        let energy = |x: &[f64]| x.iter().map(|v| v * v).sum::<f64>();
-        let all = energy(&target[self.reach..self.reach + n]);
-        let mut step = 1;
-        while step < self.max_step {
-            // Averages of two, in place; kept if they still hold the energy.
-            let next = 2 * step;
-            let reach = self.reach / next;
-            let held: f64 = (0..n / 2)
-                .map(|i| {
-                    let j = 2 * (reach + i);
-                    let v = 0.5 * (target[j] + target[j + 1]);
-                    v * v
-                })
-                .sum();
-            if held * (next as f64) < KEPT_ENERGY * all {
+        let n = answered.len();
+        let own = &asked[self.reach..self.reach + n];
+        let line = Detrend::Linear.line(own);
+        // Lines are orthogonal to what is left of them.
+        let left = |energy: f64, n: usize, step: usize| energy - line.map_or(0.0, |line| line.energy(n, step as f64));
+        let all = left(sums::energy(own), n, 1);
+        let mut step = self.max_step;
+        while step > 1 {
+            sums::block_means(own, step, &mut measured[..n / step]);
+            if left(sums::energy(&measured[..n / step]), n / step, step) * step as f64 >= KEPT_ENERGY * all {
                 break;
             }
-            n_target = halve(&mut target[..n_target]);
-            n = halve(&mut measured[..n]);
-            step = next;
+            step /= 2;
         }
+        let n = n / step;
+        let n_target = n + 2 * (self.reach / step);
+        sums::block_means(asked, step, &mut target[..n_target]);
+        sums::block_means(answered, step, &mut measured[..n]);
         let reach = self.reach / step;
         let cycles = cycles(&target[reach..reach + n]);
+        take_line(&mut target[..n_target], reach..reach + n);
+        take_line(&mut measured[..n], 0..n);
         let at = liveliest(&target[reach..reach + n]);
         let n = n.min(MAX_STRETCH);
         let (target, measured) = (&target[at..at + n + 2 * reach], &mut measured[at..at + n]);
-        let mean = measured.iter().sum::<f64>() / n as f64;
+        let mean = sums::sum(measured) / n as f64;
         measured.iter_mut().for_each(|v| *v -= mean);
-        let spread = energy(measured);
+        let spread = sums::energy(measured);
         let correlations = &mut correlations[..2 * reach + 1];
         self.arch.dispatch(Correlate { target, measured, out: correlations });
-        let round_off = 1e-13 * energy(target);
+        let round_off = 1e-13 * sums::energy(target);
         let (mut sum, mut squares): (f64, f64) = target[..n].iter().fold((0.0, 0.0), |(s, q), v| (s + v, q + v * v));
         let mut moved = false;
         for k in 0..correlations.len() {
@@ -221,28 +217,20 @@ impl Peaks {
     }
 }
 
-/// out = samples less the least-squares line of `own`, which starts at index `offset` of them.
-fn copy_less_line(samples: &[f64], own: &[f64], offset: usize, out: &mut [f64]) {
-    let Some(line) = Detrend::Linear.line(own) else { return out.copy_from_slice(samples) };
-    for (i, (y, x)) in out.iter_mut().zip(samples).enumerate() {
-        *y = x - line.at_f64(i as f64 - offset as f64);
+/// Takes from all samples the least-squares line of those in `own`.
+fn take_line(samples: &mut [f64], own: std::ops::Range<usize>) {
+    if let Some(line) = Detrend::Linear.line(&samples[own.clone()]) {
+        samples.iter_mut().enumerate().for_each(|(i, v)| *v -= line.at_f64(i as f64 - own.start as f64));
     }
 }
 
-/// Averages neighbours in place; returns how many there are now.
-fn halve(samples: &mut [f64]) -> usize {
-    let n = samples.len() / 2;
-    for i in 0..n {
-        samples[i] = 0.5 * (samples[2 * i] + samples[2 * i + 1]);
-    }
-    n
-}
-
-/// Cycles of a motion in its samples, by its rms velocity over its rms displacement.
+/// Cycles of a motion in its samples, by its rms acceleration over its rms velocity: a drift adds nothing, half a wave has 0.55.
 fn cycles(samples: &[f64]) -> f64 {
-    let squares: f64 = samples.iter().map(|v| v * v).sum();
-    let steps: f64 = samples.windows(2).map(|w| (w[1] - w[0]) * (w[1] - w[0])).sum();
-    if squares > 0.0 { samples.len() as f64 * (steps / squares).sqrt() / (2.0 * std::f64::consts::PI) } else { 0.0 }
+    let velocity = sums::step_energy(samples);
+    let bend = |w: &[f64]| w[2] - 2.0 * w[1] + w[0];
+    let acceleration: f64 = samples.windows(3).map(|w| bend(w) * bend(w)).sum();
+    let n = samples.len() as f64;
+    if velocity > 0.0 { n * (acceleration / velocity).sqrt() / (2.0 * std::f64::consts::PI) } else { 0.0 }
 }
 
 /// Where the [`MAX_STRETCH`] samples of most energy start.
@@ -250,10 +238,9 @@ fn liveliest(samples: &[f64]) -> usize {
     if samples.len() <= MAX_STRETCH {
         return 0;
     }
-    let energy = |x: &[f64]| x.iter().map(|v| v * v).sum::<f64>();
     let starts = (0..=samples.len() - MAX_STRETCH).step_by(STRETCH_STEP);
     starts
-        .map(|s| (s, energy(&samples[s..s + MAX_STRETCH])))
+        .map(|s| (s, sums::energy(&samples[s..s + MAX_STRETCH])))
         .fold((0, f64::NEG_INFINITY), |best, next| if next.1 > best.1 { next } else { best })
         .0
 }

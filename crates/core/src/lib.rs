@@ -43,6 +43,7 @@ pub mod reason;
 pub mod response;
 pub mod slopes;
 mod spectrum;
+mod sums;
 pub mod tracking;
 pub mod window;
 

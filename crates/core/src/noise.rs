@@ -4,14 +4,15 @@
 //! over frequency of |U_k|^2 S_k, S the noise's spectrum. S is taken from the residual: whitened by an autoregression, its
 //! periodogram is flat enough to be averaged over wide blocks of bins, each corrected for what the fit has taken out of it.
 
-use num_complex::Complex;
-use pulp::{Arch, NullaryFnOnce};
-
 use crate::quantile::student_t_975;
 use crate::spectrum::{Bins, Sink};
+use crate::sums;
+use num_complex::Complex;
 
 /// Highest order of the autoregression.
 pub(crate) const MAX_ORDER: usize = 4;
+/// Least of |A|^2 over its mean: no noise spectrum rises higher above the rest.
+const FLATTEST: f64 = 1e-8;
 /// Independent bins in which the residual is compared with the target: within them gain and delay are one number.
 const FINE: f64 = 8.0;
 /// Independent bins from which a spectrum can be estimated at all.
@@ -27,37 +28,29 @@ pub(crate) struct Autoregression {
 impl Autoregression {
     pub(crate) const WHITE: Self = Self { coefficients: [1.0, 0.0, 0.0, 0.0, 0.0], order: 0 };
 
-    /// Fits `samples` (Burg 1967), the order by the Bayesian information criterion for `n_effective` samples; `scratch` is
-    /// twice as long as `samples`.
-    pub(crate) fn fit(arch: Arch, samples: &[f64], n_effective: f64, scratch: &mut [f64]) -> Self {
-        let n = samples.len();
-        let (forward, rest) = scratch.split_at_mut(n);
-        let backward = &mut rest[..n];
-        forward.copy_from_slice(samples);
-        backward.copy_from_slice(samples);
-        let mut now = Self::WHITE;
-        let mut best = Self::WHITE;
+    /// Fits `samples` by their autocorrelation (Yule 1927, Levinson 1947), the order by the Bayesian information criterion
+    /// where `n_effective` of them count as independent (tapers leave fewer).
+    pub(crate) fn fit(samples: &[f64], n_effective: f64) -> Self {
+        let r = sums::lag_products::<{ MAX_ORDER + 1 }>(samples);
+        let (mut now, mut best) = (Self::WHITE, Self::WHITE);
+        let mut variance = r[0];
         // n log(variance) + order log n, relative to order 0.
         let (mut criterion, mut least) = (0.0, 0.0);
-        for order in 1..=MAX_ORDER.min(n / 8) {
-            let m = n - order;
-            let (f, b) = (&mut forward[order..], &mut backward[..m]);
-            let (cross, energy) = arch.dispatch(BurgSums { forward: f, backward: b });
-            if !(energy > 0.0 && cross.is_finite()) {
+        for order in 1..=MAX_ORDER.min(samples.len() / 8) {
+            let cross: f64 = (0..order).map(|i| now.coefficients[i] * r[order - i]).sum();
+            let reflection = -cross / variance;
+            if reflection.is_nan() || reflection.abs() >= 1.0 {
                 break;
             }
-            let reflection = (-2.0 * cross / energy).clamp(-1.0, 1.0);
-            arch.dispatch(BurgStep { forward: f, backward: b, reflection });
             let previous = now.coefficients;
             for i in 1..=order {
                 now.coefficients[i] += reflection * previous[order - i];
             }
             now.order = order;
-            criterion += n_effective * (1.0 - reflection * reflection).max(f64::MIN_POSITIVE).ln() + n_effective.ln();
+            variance *= 1.0 - reflection * reflection;
+            criterion += n_effective * (1.0 - reflection * reflection).ln() + n_effective.ln();
             if criterion < least {
                 (best, least) = (now, criterion);
-            } else if order >= best.order + 2 {
-                break;
             }
         }
         best
@@ -79,54 +72,6 @@ impl Autoregression {
                 sum += self.coefficients[k] * samples[i + p - k];
             }
             out[i] = sum;
-        }
-    }
-}
-
-/// sum f_i b_i and sum f_i^2 + b_i^2
-struct BurgSums<'a> {
-    forward: &'a [f64],
-    backward: &'a [f64],
-}
-
-impl NullaryFnOnce for BurgSums<'_> {
-    type Output = (f64, f64);
-
-    #[inline(always)]
-    fn call(self) -> (f64, f64) {
-        const LANES: usize = 16;
-        let (mut cross, mut energy) = ([0.0; LANES], [0.0; LANES]);
-        let (f, b) = (self.forward.chunks_exact(LANES), self.backward.chunks_exact(LANES));
-        for (f, b) in f.remainder().iter().zip(b.remainder()) {
-            cross[0] += f * b;
-            energy[0] += f * f + b * b;
-        }
-        for (f, b) in f.zip(b) {
-            for i in 0..LANES {
-                cross[i] += f[i] * b[i];
-                energy[i] += f[i] * f[i] + b[i] * b[i];
-            }
-        }
-        (cross.iter().sum(), energy.iter().sum())
-    }
-}
-
-/// f += r b, b += r f
-struct BurgStep<'a> {
-    forward: &'a mut [f64],
-    backward: &'a mut [f64],
-    reflection: f64,
-}
-
-impl NullaryFnOnce for BurgStep<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        for (f, b) in self.forward.iter_mut().zip(self.backward) {
-            let (x, y) = (*f, *b);
-            *f = x + self.reflection * y;
-            *b = y + self.reflection * x;
         }
     }
 }
@@ -260,6 +205,7 @@ impl<'a> Spread<'a> {
     /// The bin at zero frequency, which stands for half a pair of bins.
     pub(crate) fn zero_frequency(&mut self, y: f64, velocity: f64, residual: f64) {
         let whitening = self.whitening[0] + 2.0 * self.whitening[1..].iter().sum::<f64>();
+        let whitening = whitening.max(FLATTEST * self.whitening[0]);
         let Influence { gain, delay, leverage } = self.influence;
         let cell = &mut self.cells[0];
         cell.n += 0.5;
@@ -368,6 +314,8 @@ impl Sink for Spread<'_> {
                 whitening[i] += 2.0 * self.whitening[l] * now;
                 (before, now) = (now, 2.0 * c * now - before);
             }
+            // A tone in the residual would make this zero.
+            whitening[i] = whitening[i].max(FLATTEST * self.whitening[0]);
             if let Some(correction) = self.correction {
                 squared[i] = correction[at + i] * correction[at + i];
             }

@@ -1,6 +1,7 @@
 //! One target with its measured, checked once and borrowed after.
 
 use crate::error::{Error, Result, Signal};
+use crate::sums;
 
 /// Fewest samples that can be judged.
 pub const MIN_SAMPLES: usize = 4;
@@ -71,9 +72,11 @@ impl<'a> Pair<'a> {
     /// # Errors
     /// [`Error::NotFinite`], [`Error::Range`].
     pub fn check_samples(&self) -> Result<()> {
-        self.check_finite()?;
         for (signal, samples) in [(Signal::Target, self.target), (Signal::Measured, self.measured)] {
-            let peak = peak(samples);
+            let (peak, finite) = sums::peak(samples);
+            if !finite {
+                check_finite(samples, signal)?;
+            }
             if peak != 0.0 && !SQUARABLE.contains(&peak) {
                 return Err(Error::Range { signal, peak, weight_power: 2 });
             }
@@ -87,7 +90,7 @@ const SQUARABLE: std::ops::RangeInclusive<f64> = 1e-120..=1e120;
 
 /// max |x|
 pub(crate) fn peak(samples: &[f64]) -> f64 {
-    samples.iter().fold(0.0, |p: f64, v| p.max(v.abs()))
+    sums::peak(samples).0
 }
 
 /// Refuses a rate that is not a positive finite number.

@@ -15,7 +15,7 @@ pub enum Reason {
     },
     /// The target goes through too little of a cycle.
     FewCycles {
-        /// Cycles in the window, a straight line taken out.
+        /// Cycles in the window, by its rms acceleration over its rms velocity.
         found: f64,
     },
     /// Too little of measured follows the target.
@@ -68,7 +68,7 @@ impl fmt::Display for Reason {
             ),
             Reason::FewCycles { found } => write!(
                 f,
-                "not determined: target goes through {found:.2} of a cycle, at least 0.5 is needed; take a longer window"
+                "not determined: target goes through {found:.2} of a cycle, at least 0.6 is needed; take a longer window"
             ),
             Reason::LowCoherence { goodness } if goodness.is_nan() => {
                 write!(f, "not determined: measured does not move")

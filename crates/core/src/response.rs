@@ -3,12 +3,16 @@
 //! Segment s of measured is O_s = H I_s + N_s at every bin, with a given target and stationary noise N. Least squares over
 //! the segments is Welch's H1,
 //!
-//!     H = sum conj(I_s) O_s / sum |I_s|^2,     E_s = O_s - H I_s.
+//! ```text
+//! H = sum conj(I_s) O_s / sum |I_s|^2,     E_s = O_s - H I_s.
+//! ```
 //!
 //! Noise of segments m hops apart shares samples: E[N_s conj N_(s-m)] = S r_m, r_m = sum w_t w_(t + m hop) / sum w_t^2, once
 //! each segment's phase is counted from one origin. With R the matrix of the r_m, u = I / |I| and P = 1 - u u^H,
 //!
-//!     var H = S u^H R u / sum |I_s|^2,     E[sum |E_s|^2] = S tr(P R) = S (n - u^H R u),
+//! ```text
+//! var H = S u^H R u / sum |I_s|^2,     E[sum |E_s|^2] = S tr(P R) = S (n - u^H R u),
+//! ```
 //!
 //! so that S is known from the residuals whichever segments hold the motion, with 2 tr(P R)^2 / tr(P R P R) degrees of
 //! freedom (Satterthwaite). Half of var H is along H and half across it.

@@ -169,7 +169,11 @@ impl Spectrum {
 
     /// Room for the packed transform of one signal.
     pub(crate) fn packed(&self) -> Vec<Complex<f64>> {
-        vec![Complex::new(0.0, 0.0); self.cascade.out_len() / 2]
+        vec![Complex::new(0.0, 0.0); self.packed_len()]
+    }
+
+    pub(crate) fn packed_len(&self) -> usize {
+        self.cascade.out_len() / 2
     }
 
     pub(crate) fn scratch(&self) -> Scratch {
@@ -312,9 +316,14 @@ impl Spectrum {
         self.visit_pair(state.pair(), sink);
     }
 
+    /// The same for one packed transform, in the target's place; what stands in measured's is zero.
+    pub(crate) fn visit_one<S: Sink>(&self, bins: &[Complex<f64>], sink: &mut S) {
+        self.arch.dispatch(Visit::<S, false> { plan: self, pair: [bins, bins], sink });
+    }
+
     /// The same for any two packed transforms, the first in the target's place.
     pub(crate) fn visit_pair<S: Sink>(&self, pair: [&[Complex<f64>]; 2], sink: &mut S) {
-        self.arch.dispatch(Visit { plan: self, pair, sink });
+        self.arch.dispatch(Visit::<S, true> { plan: self, pair, sink });
     }
 }
 
@@ -353,21 +362,21 @@ impl WithSimd for MakeStream<'_> {
     }
 }
 
-/// [`Unpack::visit`] compiled for the processor at hand.
-struct Visit<'a, S> {
+/// [`Unpack::visit`] compiled for the processor at hand, of both signals or of the first.
+struct Visit<'a, S, const BOTH: bool> {
     plan: &'a Spectrum,
     pair: [&'a [Complex<f64>]; 2],
     sink: &'a mut S,
 }
 
-impl<S: Sink> NullaryFnOnce for Visit<'_, S> {
+impl<S: Sink, const BOTH: bool> NullaryFnOnce for Visit<'_, S, BOTH> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
         let Spectrum { unpack, first, last, .. } = self.plan;
         let [target, measured] = self.pair;
-        unpack.visit(target, measured, *first, *last, self.sink);
+        unpack.visit::<S, BOTH>(target, measured, *first, *last, self.sink);
     }
 }
 
@@ -420,8 +429,15 @@ impl Unpack {
     }
 
     #[inline(always)]
-    fn single<S: Sink>(&self, target: &[Complex<f64>], measured: &[Complex<f64>], k: usize, sink: &mut S) {
-        let (t, m) = (self.bin(target, k), self.bin(measured, k));
+    fn single<S: Sink, const BOTH: bool>(
+        &self,
+        target: &[Complex<f64>],
+        measured: &[Complex<f64>],
+        k: usize,
+        sink: &mut S,
+    ) {
+        let t = self.bin(target, k);
+        let m = if BOTH { self.bin(measured, k) } else { Complex::new(0.0, 0.0) };
         sink.take(&Bins::<1> {
             first: k,
             target_re: [t.re],
@@ -432,7 +448,7 @@ impl Unpack {
     }
 
     #[inline(always)]
-    fn visit<S: Sink>(
+    fn visit<S: Sink, const BOTH: bool>(
         &self,
         target: &[Complex<f64>],
         measured: &[Complex<f64>],
@@ -457,7 +473,8 @@ impl Unpack {
                 twiddle[i] = coarse * self.fine[i];
             }
             let (t_low, t_high) = unpack_group(target, half, k, &twiddle);
-            let (m_low, m_high) = unpack_group(measured, half, k, &twiddle);
+            let zero = ([0.0; LANES], [0.0; LANES]);
+            let (m_low, m_high) = if BOTH { unpack_group(measured, half, k, &twiddle) } else { (zero, zero) };
             for (needed, base, (t_re, t_im), (m_re, m_im)) in
                 [(lower_needed, k, t_low, m_low), (upper_needed, upper, t_high, m_high)]
             {
@@ -487,10 +504,10 @@ impl Unpack {
         }
         // What the groups leave: the middle bins and the Nyquist bin (k = H).
         for k in first.max(grouped + 1)..(half - grouped).min(last + 1) {
-            self.single(target, measured, k, sink);
+            self.single::<S, BOTH>(target, measured, k, sink);
         }
         if kept(half) {
-            self.single(target, measured, half, sink);
+            self.single::<S, BOTH>(target, measured, half, sink);
         }
     }
 }

@@ -603,6 +603,23 @@ pub(crate) fn weigh(
     }
 }
 
+/// sum |I|^2 and sum k |I|^2 over the kept bins of one packed transform.
+pub(crate) fn centroid(spectrum: &Spectrum, correction: Option<&[f64]>, bins: &[Complex<f64>]) -> (f64, f64) {
+    fn sums<const CORRECT: bool>(
+        spectrum: &Spectrum,
+        bins: &[Complex<f64>],
+        mut weigh: Weigh<'_, 2, CORRECT>,
+    ) -> (f64, f64) {
+        spectrum.visit_one(bins, &mut weigh);
+        let Sums { power, moment, .. } = weigh.sums();
+        (power, moment)
+    }
+    match correction {
+        None => sums(spectrum, bins, Weigh::<2, false>::new(&[], 0, 2)),
+        Some(correction) => sums(spectrum, bins, Weigh::<2, true>::new(correction, spectrum.first(), 2)),
+    }
+}
+
 /// Adds up O conj(I) |I|^(l-2), |I|^l and k |I|^l. `L` = 2 is compiled apart; 0 stands for any power.
 struct Weigh<'a, const L: u32, const CORRECT: bool> {
     correction: &'a [f64],

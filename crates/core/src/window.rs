@@ -2,6 +2,8 @@
 
 use std::f64::consts::PI;
 
+use crate::sums;
+
 /// Window over the record, symmetric (first and last sample alike).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Window {
@@ -102,11 +104,11 @@ impl Detrend {
         let centre = (n - 1.0) / 2.0;
         let level = match self {
             Detrend::None => return None,
-            Detrend::Mean | Detrend::Linear => samples.iter().sum::<f64>() / n,
+            Detrend::Mean | Detrend::Linear => sums::sum(samples) / n,
         };
         let slope = match self {
             Detrend::Linear => {
-                let moment: f64 = samples.iter().enumerate().map(|(i, v)| (i as f64 - centre) * (v - level)).sum();
+                let moment = sums::moment(samples, centre, level);
                 // sum (i - centre)^2 over 0 .. n-1
                 moment / (n * (n * n - 1.0) / 12.0)
             }
@@ -129,6 +131,12 @@ impl Line {
     #[inline(always)]
     pub fn at(&self, i: usize) -> f64 {
         self.at_f64(i as f64)
+    }
+
+    /// Sum of its squares over `n` places, `step` apart, about the centre.
+    pub(crate) fn energy(&self, n: usize, step: f64) -> f64 {
+        let n = n as f64;
+        n * self.level * self.level + (self.slope * step).powi(2) * n * (n * n - 1.0) / 12.0
     }
 
     /// The same at any place, before the first sample and after the last too.

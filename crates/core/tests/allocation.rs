@@ -6,7 +6,10 @@ use std::cell::Cell;
 use rthstrack::dynamics::{
     Actuator, BoucWen, Compensation, Converter, Delay, Dynamics, Law, Motion, SampledActuator, ServoHydraulic,
 };
-use rthstrack::{Decimator, Detrend, Evaluator, EvaluatorConfig, KeyFrequencies, KeyFrequenciesConfig, Pair, Window};
+use rthstrack::{
+    Decimator, Detrend, Estimator, Evaluator, EvaluatorConfig, KeyFrequencies, KeyFrequenciesConfig, Noise, Pair,
+    Window,
+};
 
 thread_local! {
     static COUNT: Cell<usize> = const { Cell::new(0) };
@@ -39,6 +42,16 @@ fn evaluating_allocates_nothing() {
         EvaluatorConfig { data_decimation: 512, frequency_decimation: 2, ..Default::default() },
         EvaluatorConfig { window: Window::Hann, detrend: Detrend::Linear, weight_power: 3, ..Default::default() },
         EvaluatorConfig { decimator: Decimator::Chebyshev, data_decimation: 8, ..Default::default() },
+        EvaluatorConfig { estimator: Estimator::Aligned, ..Default::default() },
+        EvaluatorConfig { estimator: Estimator::LeastSquares, ..Default::default() },
+        EvaluatorConfig {
+            estimator: Estimator::LeastSquares,
+            window: Window::Hann,
+            band_hz: Some((0.1, 20.0)),
+            ..Default::default()
+        },
+        EvaluatorConfig { estimator: Estimator::LeastSquares, noise: Noise::Coloured, ..Default::default() },
+        EvaluatorConfig { estimator: Estimator::LeastSquares, noise_ratio: 1.0, ..Default::default() },
     ] {
         let evaluator = Evaluator::new(target.len(), 1000.0, config).unwrap();
         let mut state = evaluator.state();

@@ -1,0 +1,288 @@
+//! The estimators that shift the target, against motions whose gain and delay are known and against sums written out.
+
+use std::f64::consts::PI;
+
+use rthstrack::{
+    Detrend, Error, Estimator, Evaluator, EvaluatorConfig, MovingConfig, Noise, Pair, Reason, Tracking, Window,
+    evaluate_moving,
+};
+
+const RATE_HZ: f64 = 1024.0;
+const GAIN: f64 = 1.1;
+/// What interpolation between samples and the iteration's end leave, relative.
+const INTERPOLATION: f64 = 1e-6;
+
+/// A motion known at any time: cycles that grow and fade, a drift, a residual displacement, a little of a higher tone.
+fn motion(t: f64) -> f64 {
+    (2.0 * PI * 1.1 * t).sin() * (-(t - 6.0) * (t - 6.0) / 12.0).exp()
+        + 0.8 / (1.0 + (-2.0 * (t - 6.5)).exp())
+        + 0.05 * (2.0 * PI * 7.3 * t + 0.4).sin()
+}
+
+fn pair(n: usize, delay_s: f64) -> (Vec<f64>, Vec<f64>) {
+    (0..n).map(|i| i as f64 / RATE_HZ).map(|t| (motion(t), GAIN * motion(t - delay_s))).unzip()
+}
+
+/// Normal numbers of variance 1 from sums of twelve uniform ones.
+fn noise(n: usize, mut seed: u64) -> Vec<f64> {
+    let mut uniform = move || {
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (seed >> 11) as f64 / (1u64 << 53) as f64
+    };
+    (0..n).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect()
+}
+
+fn evaluate(target: &[f64], measured: &[f64], config: EvaluatorConfig) -> Tracking {
+    let evaluator = Evaluator::new(target.len(), RATE_HZ, config).expect("a possible plan");
+    evaluator.evaluate(&mut evaluator.state(), &Pair::new(target, measured, RATE_HZ).unwrap()).expect("judged")
+}
+
+fn least_squares() -> EvaluatorConfig {
+    EvaluatorConfig { estimator: Estimator::LeastSquares, ..Default::default() }
+}
+
+#[test]
+fn a_lag_and_a_lead_are_found_with_their_signs_whatever_the_window() {
+    for delay_s in [-0.1, -0.0123, 0.0, 0.0005, 0.02, 0.2] {
+        let (target, measured) = pair(12_000, delay_s);
+        for (_, estimator) in &Estimator::NAMES[1..] {
+            for (_, window) in Window::NAMES {
+                for (_, detrend) in Detrend::NAMES {
+                    let config = EvaluatorConfig { estimator: *estimator, window, detrend, ..Default::default() };
+                    let found = evaluate(&target, &measured, config);
+                    let context = format!("{delay_s} {estimator:?} {window:?} {detrend:?}: {found:?}");
+                    assert!((found.amplitude - GAIN).abs() < INTERPOLATION, "{context}");
+                    assert!((found.delay_s - delay_s).abs() < INTERPOLATION * 1e-2, "{context}");
+                    assert_eq!(found.reason, None, "{context}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn bins_of_p_q_and_a_band_find_the_same() {
+    let (target, measured) = pair(12_000, 0.0123);
+    for (data_decimation, frequency_decimation, band_hz) in
+        [(8, 1, None), (1, 4, None), (16, 2, None), (1, 1, Some((0.3, 12.0)))]
+    {
+        for (_, estimator) in &Estimator::NAMES[1..] {
+            let config = EvaluatorConfig {
+                estimator: *estimator,
+                data_decimation,
+                frequency_decimation,
+                band_hz,
+                ..Default::default()
+            };
+            let found = evaluate(&target, &measured, config);
+            assert!((found.amplitude - GAIN).abs() < INTERPOLATION, "{config:?} {found:?}");
+            assert!((found.delay_s - 0.0123).abs() < 1e-8, "{config:?} {found:?}");
+        }
+    }
+}
+
+#[test]
+fn every_window_of_a_drifting_record_is_right() {
+    let (target, measured) = pair(14_000, 0.005);
+    for (_, estimator) in &Estimator::NAMES[1..] {
+        for window in [Window::Boxcar, Window::Hann] {
+            let config = MovingConfig {
+                evaluator: EvaluatorConfig { estimator: *estimator, window, ..Default::default() },
+                ..Default::default()
+            };
+            let moving = evaluate_moving(&Pair::new(&target, &measured, RATE_HZ).unwrap(), &config).unwrap();
+            assert!(moving.valid.iter().filter(|v| **v).count() > 30, "{:?}", moving.reason);
+            for (i, valid) in moving.valid.iter().enumerate() {
+                assert_eq!(*valid, moving.reason[i].is_none(), "{:?}", moving.reason[i]);
+                if *valid {
+                    assert!((moving.delay_s[i] - 0.005).abs() < 1e-7, "{i}: {}", moving.delay_s[i]);
+                    assert!((moving.amplitude[i] - GAIN).abs() < 1e-5, "{i}: {}", moving.amplitude[i]);
+                }
+            }
+        }
+    }
+}
+
+/// The estimate minimises the sum of squares over the samples for which the shifted target is known: on either side of it, by
+/// exact sines and the best gain, the sum is larger.
+#[test]
+fn the_sum_of_squares_is_least_at_the_estimate() {
+    let n = 8192;
+    let tone = |t: f64| (2.0 * PI * 1.3 * t).sin() + 0.6 * (2.0 * PI * 2.9 * t + 1.0).cos();
+    let errors = noise(n, 7);
+    let time = |i: usize| i as f64 / RATE_HZ;
+    let target: Vec<f64> = (0..n).map(|i| tone(time(i))).collect();
+    let measured: Vec<f64> = (0..n).map(|i| 0.9 * tone(time(i) - 0.015) + 0.05 * errors[i]).collect();
+    let found = evaluate(&target, &measured, least_squares());
+    // Any fixed range within the judged samples moves the least by far less than the noise does; so the whole inner range.
+    let squares = |delay_s: f64| -> f64 {
+        let range = 64..n - 64;
+        let (mut oo, mut oy, mut yy) = (0.0, 0.0, 0.0);
+        for i in range {
+            let y = tone(time(i) - delay_s);
+            oo += measured[i] * measured[i];
+            oy += measured[i] * y;
+            yy += y * y;
+        }
+        oo - oy * oy / yy
+    };
+    let step = 0.5 * found.delay_std_s;
+    assert!(squares(found.delay_s) < squares(found.delay_s - step), "{found:?}");
+    assert!(squares(found.delay_s) < squares(found.delay_s + step), "{found:?}");
+    // 1 / curvature is the variance, in white noise.
+    let h = 1e-5;
+    let curvature = (squares(found.delay_s + h) + squares(found.delay_s - h) - 2.0 * squares(found.delay_s)) / (h * h);
+    let expected = 0.05 / (0.5 * curvature).sqrt();
+    assert!((found.delay_std_s / expected - 1.0).abs() < 0.15, "{} {expected}", found.delay_std_s);
+    assert!(found.delay_interval_s.0 < 0.015 && 0.015 < found.delay_interval_s.1, "{found:?}");
+    assert!(found.amplitude_interval.0 < 0.9 && 0.9 < found.amplitude_interval.1, "{found:?}");
+}
+
+#[test]
+fn intervals_cover_in_white_and_in_coloured_noise() {
+    let n = 4096;
+    let draws = 200;
+    let (target, clean) = pair(8192, 0.005);
+    for (correlation, noise_model) in [(0.0, Noise::White), (0.9, Noise::White), (0.9, Noise::Coloured)] {
+        let evaluator = EvaluatorConfig { noise: noise_model, ..least_squares() };
+        let config = MovingConfig { window_s: 4.0, hop_s: 2.0, minimum_std_ratio: 0.0, evaluator };
+        let (mut delays, mut gains, mut total) = (0, 0, 0);
+        for draw in 0..draws {
+            let white = noise(clean.len(), 1000 + draw);
+            let mut state = 0.0;
+            let measured: Vec<f64> = clean
+                .iter()
+                .zip(&white)
+                .map(|(c, w)| {
+                    state = correlation * state + w * (1.0f64 - correlation * correlation).sqrt();
+                    c + 0.01 * state
+                })
+                .collect();
+            let moving = evaluate_moving(&Pair::new(&target, &measured, RATE_HZ).unwrap(), &config).unwrap();
+            assert_eq!(moving.valid.len(), (8192 - n) / 2048 + 1);
+            // The window in the middle has target on both sides.
+            let (low, high) = moving.delay_interval_s[1];
+            delays += usize::from(low <= 0.005 && 0.005 <= high);
+            let (low, high) = moving.amplitude_interval[1];
+            gains += usize::from(low <= GAIN && GAIN <= high);
+            total += 1;
+        }
+        // 95 % of 200 is 190, standard deviation 3.
+        for covered in [delays, gains] {
+            assert!((179..=199).contains(&covered), "{correlation} {noise_model:?}: {covered} of {total}");
+        }
+    }
+}
+
+#[test]
+fn noise_on_both_signals_does_not_bias_total_least_squares() {
+    let (clean_target, clean) = pair(8192, 0.005);
+    let config = EvaluatorConfig { noise_ratio: 1.0, band_hz: Some((0.1, 20.0)), ..least_squares() };
+    let (mut gains, mut delays) = (Vec::new(), Vec::new());
+    for draw in 0..60 {
+        let (e, f) = (noise(8192, 2 * draw + 1), noise(8192, 2 * draw + 2));
+        let target: Vec<f64> = clean_target.iter().zip(&e).map(|(x, e)| x + 0.05 * e).collect();
+        let measured: Vec<f64> = clean.iter().zip(&f).map(|(x, e)| x + 0.05 * e).collect();
+        let found = evaluate(&target, &measured, config);
+        gains.push(found.amplitude - GAIN);
+        delays.push(found.delay_s - 0.005);
+    }
+    for errors in [gains, delays] {
+        let n = errors.len() as f64;
+        let mean = errors.iter().sum::<f64>() / n;
+        let std = (errors.iter().map(|e| (e - mean) * (e - mean)).sum::<f64>() / n).sqrt();
+        // Four standard deviations of the mean.
+        assert!(mean.abs() < 4.0 * std / n.sqrt(), "{mean} {std}");
+    }
+}
+
+#[test]
+fn what_cannot_be_determined_says_why() {
+    let n = 8192;
+    let time = |i: usize| i as f64 / RATE_HZ;
+    let reason = |target: &[f64], measured: &[f64]| evaluate(target, measured, least_squares()).reason;
+    let sine: Vec<f64> = (0..n).map(|i| (2.0 * PI * 5.0 * time(i)).sin()).collect();
+    let late: Vec<f64> = (0..n).map(|i| 0.9 * (2.0 * PI * 5.0 * (time(i) - 0.03)).sin()).collect();
+    assert!(matches!(reason(&sine, &late), Some(Reason::Ambiguous { .. })), "{:?}", reason(&sine, &late));
+    let near = EvaluatorConfig { max_delay_s: 0.09, ..least_squares() };
+    let found = evaluate(&sine, &late, near);
+    assert!((found.delay_s - 0.03).abs() < 1e-8 && found.reason.is_none(), "{found:?}");
+
+    let (target, measured) = pair(n, 0.03);
+    let near = EvaluatorConfig { max_delay_s: 0.01, ..least_squares() };
+    assert!(matches!(evaluate(&target, &measured, near).reason, Some(Reason::BeyondMaxDelay { .. })));
+    let negative: Vec<f64> = measured.iter().map(|v| -v).collect();
+    assert_eq!(reason(&target, &negative), Some(Reason::OppositeSign));
+    assert!(matches!(reason(&target, &noise(n, 3)), Some(Reason::LowCoherence { .. } | Reason::OppositeSign)));
+    let still = vec![1.0; n];
+    assert_eq!(reason(&target, &still), Some(Reason::Still));
+    let slow: Vec<f64> = (0..n).map(|i| (2.0 * PI * 0.02 * time(i)).sin()).collect();
+    assert!(matches!(reason(&slow, &slow), Some(Reason::FewCycles { .. })), "{:?}", reason(&slow, &slow));
+    assert!(evaluate(&target[..16], &measured[..16], least_squares()).reason.is_some_and(|r| r.is_undetermined()));
+}
+
+/// An actuator that answers high frequencies later and weaker: one gain and one delay leave what still follows the target.
+#[test]
+fn no_interval_is_given_where_the_residual_follows_the_target() {
+    let n = 16384;
+    let (mut smooth, mut lagged) = (0.0, 0.0);
+    let (mut target, mut measured) = (Vec::new(), Vec::new());
+    for w in noise(n, 11) {
+        smooth += (w - smooth) / 8.0;
+        target.push(smooth);
+        lagged += (smooth - lagged) / 29.0;
+        measured.push(lagged);
+    }
+    let found = evaluate(&target, &measured, least_squares());
+    assert!(matches!(found.reason, Some(Reason::ResidualFollowsTarget { .. })), "{found:?}");
+    assert!(found.delay_s > 0.0 && found.delay_interval_s.0.is_nan() && found.delay_std_s.is_nan(), "{found:?}");
+}
+
+#[test]
+fn settings_that_exclude_each_other_are_refused() {
+    let refused = |config: EvaluatorConfig| Evaluator::new(8192, RATE_HZ, config).err();
+    let combined = |error: Option<Error>| matches!(error, Some(Error::Combination { .. }));
+    assert!(combined(refused(EvaluatorConfig { noise_ratio: 1.0, ..Default::default() })));
+    assert!(combined(refused(EvaluatorConfig { noise: Noise::Coloured, ..Default::default() })));
+    assert!(combined(refused(EvaluatorConfig { weight_power: 3, ..least_squares() })));
+    assert!(combined(refused(EvaluatorConfig { noise: Noise::Coloured, noise_ratio: 1.0, ..least_squares() })));
+    for max_delay_s in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let error = refused(EvaluatorConfig { max_delay_s, ..least_squares() });
+        assert!(matches!(error, Some(Error::Setting { name: "max_delay_s", .. })), "{error:?}");
+    }
+    for noise_ratio in [-1.0, f64::NAN, f64::INFINITY] {
+        let error = refused(EvaluatorConfig { noise_ratio, ..least_squares() });
+        assert!(matches!(error, Some(Error::Setting { name: "noise_ratio", .. })), "{error:?}");
+    }
+}
+
+/// Any finite samples give a number or a reason, and never a panic.
+#[test]
+fn odd_samples_are_answered() {
+    let n = 600;
+    let spikes: Vec<f64> = (0..n).map(|i| if i % 97 == 0 { 1e6 } else { 0.0 }).collect();
+    let step: Vec<f64> = (0..n).map(|i| if i < n / 2 { 0.0 } else { 1.0 }).collect();
+    let ramp: Vec<f64> = (0..n).map(|i| i as f64).collect();
+    let white = noise(n, 5);
+    let quantised: Vec<f64> = white.iter().map(|v| v.round()).collect();
+    let large: Vec<f64> = white.iter().map(|v| v + 1e9).collect();
+    let all = [spikes, step, ramp, white, quantised, large];
+    for target in &all {
+        for measured in &all {
+            for len in [4, 5, 16, 63, 64, 300, n] {
+                for (noise, noise_ratio) in [(Noise::White, 0.0), (Noise::Coloured, 0.0), (Noise::White, 0.5)] {
+                    for window in [Window::Boxcar, Window::Hann] {
+                        let config = EvaluatorConfig { noise, noise_ratio, window, ..least_squares() };
+                        let Ok(pair) = Pair::new(&target[..len], &measured[..len], RATE_HZ) else { continue };
+                        let evaluator = Evaluator::new(len, RATE_HZ, config).unwrap();
+                        let found = evaluator.evaluate(&mut evaluator.state(), &pair).unwrap();
+                        let undetermined = found.reason.is_some_and(|r| r.is_undetermined());
+                        assert_eq!(found.delay_s.is_nan(), undetermined, "{found:?}");
+                        assert_eq!(found.amplitude.is_nan(), undetermined, "{found:?}");
+                        assert_eq!(found.delay_interval_s.0.is_nan(), found.reason.is_some(), "{found:?}");
+                    }
+                }
+            }
+        }
+    }
+}
