@@ -51,11 +51,16 @@ def pasted(
             runs = [("shell", c, ["bash", "-euo", "pipefail", "-c", c]) for c in _commands(block)]
         else:
             continue
+        printed: list[str] = []
         for kind, source, command in runs:
             out = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
             assert out.returncode == 0, f"{source}\n{out.stdout}\n{out.stderr}"
             assert out.stdout or kind == "python", f"{source}\nprinted nothing"
+            printed += [line.rstrip() for line in out.stdout.splitlines()]
             done[kind].append(source)
+        if language == "console":
+            shown = [line for line in block.splitlines() if not line.startswith("$ ") and line != "..."]
+            assert [line for line in shown if line not in printed] == [], "the page shows what is not printed"
     return done
 
 

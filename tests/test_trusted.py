@@ -175,6 +175,12 @@ def test_noise_on_target_is_not_taken_for_a_change_over_time() -> None:
     assert "over time" not in found.argument
 
 
+def test_foreign_motion_is_not_taken_for_a_change_over_time() -> None:
+    found = assessed(burst(), burst(0.01) + 20 * broad(seed=9))
+    assert "over time" not in found.argument
+    assert any("coherence" in warning for warning in found.warnings)
+
+
 def test_a_warning_that_the_argument_says_is_not_given_twice() -> None:
     found = assessed(burst() + 8, burst(0.01) + 8)
     assert "an offset" in found.argument
@@ -183,9 +189,9 @@ def test_a_warning_that_the_argument_says_is_not_given_twice() -> None:
 
 # ------------------------------------------------------------------------------------------------- what is missing
 
-# "few cycles" is not here: what a straight line leaves of any motion goes through about a cycle.
 UNDETERMINED = [
     ("too little motion", burst(), np.zeros(N), {}),
+    ("of a cycle", np.sin(T / 50), np.sin((T - 0.02) / 50) + noise(1e-4), {}),
     ("of measured follows target", broad(), broad(seed=9), {}),
     ("ambiguous", sine(T), sine(T - 0.02) + noise(1e-3), {"max_delay_s": 0.3}),
     ("beyond max_delay_s", broad(), broad(0.09), {"max_delay_s": 0.05}),

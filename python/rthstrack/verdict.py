@@ -142,7 +142,8 @@ def argument(
     if (missing := _undetermined(trusted)) is not None:
         said = "no number can be trusted here" if _undetermined(tracking) is None else "there is no number to use"
         return f"{said}: {missing}{_ADVICE.get(missing, '')}", None
-    if (unsteady := _unsteady(trusted_moving)) is not None:
+    # Foreign motion in measured comes and goes; it is not the actuator that changes.
+    if "coherence" not in found and (unsteady := _unsteady(trusted_moving)) is not None:
         name, text = unsteady
         return f"{text}; {_averages(tracking, trusted, name)}", None
     if slopes is not None and slopes.delay_varies:
@@ -246,13 +247,13 @@ def _unsteady(moving: MovingTracking | None) -> tuple[str, str] | None:
         steps = (values[apart:] - values[:-apart])[pairs]
         if steps.size < _STEADY_WINDOWS or np.mean(steps**2) > _GRADUAL * 2 * np.var(values[known]):
             continue
-        # Where the motion's frequency changes over time, it is the frequency that tells of the actuator.
-        f_eq = moving.equivalent_frequency_hz[known]
-        if np.std(f_eq) > 0 and np.corrcoef(values[known], f_eq)[0, 1] ** 2 > _BY_FREQUENCY:
-            continue
         low, high = (float(end) for end in np.quantile(values[known], (0.1, 0.9)))
         noise = float(np.median(interval[known, 1] - interval[known, 0])) / 2
         if high - low > max(_UNSTEADY * abs(float(np.median(values[known]))), _UNSTEADY_INTERVALS * noise):
+            # Where the motion's frequency changes over time, it is the frequency that tells of the actuator.
+            f_eq = moving.equivalent_frequency_hz[known]
+            if np.std(f_eq) > 0 and np.corrcoef(values[known], f_eq)[0, 1] ** 2 > _BY_FREQUENCY:
+                continue
             span = f"{factor * low:.3g} to {factor * high:.3g}{unit}"
             what = name.removesuffix("_s")
             share = f"in 80 % of the windows of {moving.window_s:.3g} s"
