@@ -120,6 +120,13 @@ def test_agreement_is_said_in_a_word() -> None:
     assert found.variants == {}
 
 
+def test_agreement_within_a_wide_interval_is_said_to_be_worth_little() -> None:
+    found = assessed(burst(), burst(0.01) + noise(5))
+    low, high = found.trusted.delay_interval_s
+    assert high - low > 0.002  # the test's own premise: more than a tenth of 10 ms to either side
+    assert "wide" in found.argument
+
+
 @pytest.mark.parametrize(
     ("cause", "target", "measured", "settings", "remedy"),
     [
@@ -426,6 +433,23 @@ def test_the_figure_shows_both_estimates_with_a_band() -> None:
     assert len(amplitude_axis.collections) == len(delay_axis.collections) == 1
     gain_axis, own_delay_axis, _ = plots.plot_frequency_response(found)
     assert len(gain_axis.collections) == len(own_delay_axis.collections) == 1
+
+
+def test_the_page_says_why_there_is_no_interval() -> None:
+    page = report_html([assessed(broad(), broad(filtered=first_order))])
+    assert 'data-field="trusted_reason">no interval: ' in page
+    assert "trusted_reason" not in report_html([assessed(burst(), burst(0.01) + noise(0.1))])
+
+
+def test_windows_without_numbers_are_counted_by_their_kind_of_reason() -> None:
+    measured = np.where(T < 22, burst(0.01), 3 * broad(seed=9)) + noise(0.05)
+    moving = assessed(burst(), measured).trusted_moving
+    assert moving is not None
+    counted = rthstrack.display.reasons(moving)
+    assert sum(n for n, _ in counted) == sum(bool(reason) for reason in moving.reason)
+    assert [n for n, _ in counted] == sorted((n for n, _ in counted), reverse=True)
+    assert len(counted) == len({text.split("(")[0].rstrip("0123456789. ") for _, text in counted})
+    assert all(text in moving.reason for _, text in counted)
 
 
 def test_the_page_holds_both_estimates() -> None:

@@ -646,8 +646,16 @@ def _heading(a: Assessment) -> str:
         f'<p class="facts">{" · ".join(facts)}</p>'
         f'<h2 class="verdict" data-field="verdict">{escape(a.verdict)}</h2>'
         f'<p class="argument" data-field="argument">{escape(a.argument)}</p>'
-        + _notice("exceeded", ("Limit exceeded", "Limits exceeded"), a.exceeded)
+        f"{_trusted_reason(a)}" + _notice("exceeded", ("Limit exceeded", "Limits exceeded"), a.exceeded)
     )
+
+
+def _trusted_reason(a: Assessment) -> str:
+    """Why the trusted estimate or its interval is missing, where the argument does not say so."""
+    text = reason(a.trusted)
+    if text is None or _why(text) in a.argument:
+        return ""
+    return f'<p class="argument muted" data-field="trusted_reason">{escape(text)}</p>'
 
 
 def _key_numbers(a: Assessment) -> str:
@@ -694,8 +702,9 @@ def _beside(a: Assessment, name: str, note: str) -> str:
     unit, factor = ("ms", 1e3) if name == "delay_s" else ("", 1.0)
     field = "delay_interval_s" if name == "delay_s" else "amplitude_interval"
     parts = [f"{_ESTIMATORS[a.tracking.settings.estimator]}; {note}".removesuffix("; ")]
-    if own := _interval(field, getattr(a.tracking, field), float(getattr(a.tracking, name)), unit, factor):
-        parts.append(own)
+    own = float(getattr(a.tracking, name))
+    if a.tracking.settings.estimator != "fei" and math.isfinite(own):
+        parts.append(_interval(field, getattr(a.tracking, field), own, unit, factor) or "no interval")
     if t is not a.tracking:
         value = float(getattr(t, name))
         parts.append(f"trusted: {_number(f'trusted_{name}', value, unit, factor)}")
@@ -760,9 +769,9 @@ def _time_charts(a: Assessment, drawing: Mapping[str, Any]) -> str:
         m = a.moving
         text = (
             f"{int(np.count_nonzero(m.valid))} of {m.time_s.size} windows of {m.window_s:.4g} s "
-            f"judged, one every {m.hop_s:.4g} s, drawn at the window's centre. Grey: {target_role} "
-            "moves too little in the window to judge by (standard deviation below "
-            f"{m.minimum_std_ratio:.3g} of the record's)."
+            f"judged, one every {m.hop_s:.4g} s, drawn at the window's centre. Grey: not judged, most often as "
+            f"{target_role} moves too little in the window (standard deviation below {m.minimum_std_ratio:.3g} of the "
+            "record's)."
         )
         moving = _chart("moving-amplitude", "Amplitude over time")
         moving += _chart(

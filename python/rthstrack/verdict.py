@@ -43,6 +43,8 @@ _DELAY_SPREAD = 0.2
 _SAME_DELAY, _SAME_DELAY_S = 1e-3, 1e-6
 # Without an interval to hold the difference against, one of a hundredth counts.
 _NOTABLE = 1e-2
+# An interval that reaches further than this share of the delay to either side says little of it.
+_WIDE_INTERVAL = 0.1
 # A change of one setting is the cause of a difference when it leaves less than this share of it.
 _EXPLAINED = 0.5
 # Phases that spread less than this average well.
@@ -172,7 +174,12 @@ def _how_well(tracking: Tracking, trusted: Tracking) -> str:
             (float(tracking.amplitude), trusted.amplitude_interval),
         )
     )
-    return "within its interval" if inside else "to a thousandth"
+    if not inside:
+        return "to a thousandth"
+    low, high = (1e3 * float(end) for end in trusted.delay_interval_s)
+    if (high - low) / 2 > _WIDE_INTERVAL * 1e3 * abs(float(trusted.delay_s)):
+        return f"within its interval, but that is wide: {low:.2g} to {high:.2g} ms"
+    return "within its interval"
 
 
 def _averages(tracking: Tracking, trusted: Tracking, name: str = "delay_s") -> str:
