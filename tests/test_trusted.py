@@ -169,6 +169,16 @@ def test_a_delay_that_varies_is_told_with_its_slope_instead_of_one_number() -> N
     assert not any("not one number" in warning for warning in found.warnings)
 
 
+def test_a_delay_that_varies_a_little_is_one_number_with_its_slope_added() -> None:
+    # d(f) = 20 ms - 0.1 ms f / Hz: 5 % less at 10 Hz than at 0.5 Hz.
+    found = assessed(broad(), broad(filtered=lambda f: np.exp(-2j * np.pi * f * (0.02 - 1e-4 * f))))
+    sentence, _, slope = found.argument.partition("; ")
+    assert sentence.startswith("use the trusted estimate: ")
+    words = slope.split()
+    assert words[:5] == ["the", "delay", "is", "falling", "by"]
+    assert float(words[5]) == pytest.approx(0.1, rel=physical(1, "%"))
+
+
 def test_a_delay_that_changes_over_time_is_told_with_its_range() -> None:
     delay_s = 0.01 + 0.02 * T / T[-1]
     measured = np.interp(T - delay_s, T, broad()) + noise(0.02)

@@ -47,6 +47,8 @@ _NOTABLE = 1e-2
 _WIDE_INTERVAL = 0.1
 # A change of one setting is the cause of a difference when it leaves less than this share of it.
 _EXPLAINED = 0.5
+# A number that changes by more than this share over the frequencies of the energy is quoted with its slope only.
+_MISLEADING = 0.1
 # Phases that spread less than this average well.
 _WIDE_RAD = math.pi / 6
 # Over time: the middle eight tenths of the windows differ by this share, and by this many of their own half intervals.
@@ -148,20 +150,21 @@ def argument(
     if "coherence" not in found and (unsteady := _unsteady(trusted_moving)) is not None:
         name, text = unsteady
         return f"{text}; {_averages(tracking, trusted, name)}", None
-    if slopes is not None and slopes.delay_varies:
+    if slopes is not None and slopes.delay_varies and _change(slopes, "delay") > _MISLEADING:
         return f"{_varying_delay(slopes)}; {_averages(tracking, trusted)}", "delay spread"
-    if slopes is not None and slopes.gain_varies:
+    if slopes is not None and slopes.gain_varies and _change(slopes, "gain") > _MISLEADING:
         return f"{_varying_gain(slopes)}; {_averages(tracking, trusted, 'amplitude')}", None
+    slowly = _varying_slowly(slopes)
     if tracking is trusted:
         interval = "with its interval" if not trusted.reason else f"for which there is {trusted.reason}"
-        return f"this is the trusted estimate, {interval}", None
+        return f"this is the trusted estimate, {interval}{slowly}", None
     ours = _NAMES[tracking.settings.estimator]
     which = _differences(tracking, trusted)
     if not which:
-        return f"{ours} agrees with the trusted estimate {_how_well(tracking, trusted)}", None
+        return f"{ours} agrees with the trusted estimate {_how_well(tracking, trusted)}{slowly}", None
     cause, text = _cause(target, tracking, trusted, which, slopes, variants, found)
     gap = " and ".join(_gap(name, tracking, trusted) for name in which)
-    return f"use the trusted estimate: {ours} is {gap}, {text}", cause
+    return f"use the trusted estimate: {ours} is {gap}, {text}{slowly}", cause
 
 
 def _how_well(tracking: Tracking, trusted: Tracking) -> str:
@@ -211,6 +214,27 @@ def _line(value: float, interval: tuple[float, float], factor: float, what: str)
         return "bent over the frequencies"
     number, _, between = with_interval(factor * abs(value), ends).partition(" ")
     return f"{'rising' if value > 0 else 'falling'} by {number}{what} a hertz {between}".rstrip()
+
+
+def _change(s: FrequencySlopes, what: str) -> float:
+    """How much gain or delay change over the band, by slope and bend, as a share of themselves."""
+    value, slope, misfit = (
+        (s.gain, s.gain_per_hz, s.gain_misfit) if what == "gain" else (s.delay_s, s.delay_s_per_hz, s.delay_misfit_s)
+    )
+    change = abs(slope) * (s.band_hz[1] - s.band_hz[0]) + 2 * misfit
+    return change / abs(value) if value else math.inf
+
+
+def _varying_slowly(s: FrequencySlopes | None) -> str:
+    """What is added to a number that changes with frequency, but by too little to mislead."""
+    if s is None:
+        return ""
+    changes = []
+    if s.delay_varies:
+        changes.append(f"the delay is {_line(s.delay_s_per_hz, s.delay_s_per_hz_interval, 1e3, ' ms')}")
+    if s.gain_varies:
+        changes.append(f"the gain is {_line(s.gain_per_hz, s.gain_per_hz_interval, 1.0, '')}")
+    return f"; {' and '.join(changes)}" if changes else ""
 
 
 def _varying_delay(s: FrequencySlopes) -> str:
