@@ -1,4 +1,4 @@
-"""The README's Python and its commands, run as a reader would paste them: one after the other, in an empty folder."""
+"""The README's Python and commands, and the estimators' page's, run as pasted: in order, in an empty folder a page."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import sys
 from pathlib import Path
 
 import pytest
+
+PAGES = ("README.md", "docs/estimators.md")
 
 # What a reader does once, before anything can be pasted; `make test` and test_install.py try these.
 SETTING_UP = ("pip ", "python -m pip", "git ", "make", "cargo ", "cd ", "apt")
@@ -28,9 +30,11 @@ def _commands(block: str) -> list[str]:
     return [c for c in commands if c and not c.startswith(("#", *SETTING_UP))]
 
 
-@pytest.fixture(scope="module")
-def pasted(root: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
-    """Runs every block; what was run, by language. The repository's examples are within reach, nothing else is."""
+@pytest.fixture(scope="module", params=PAGES)
+def pasted(
+    request: pytest.FixtureRequest, root: Path, tmp_path_factory: pytest.TempPathFactory
+) -> dict[str, list[str]]:
+    """Runs every block of a page; what was run, by language. Only the repository's examples are within reach."""
     folder = tmp_path_factory.mktemp("readme")
     (folder / "examples").symlink_to(root / "examples", target_is_directory=True)
     environment = {
@@ -40,18 +44,23 @@ def pasted(root: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, li
         "PYTHONWARNINGS": "error",
     }
     done: dict[str, list[str]] = {"python": [], "shell": []}
-    for language, block in _blocks((root / "README.md").read_text(encoding="utf-8")):
+    for language, block in _blocks((root / request.param).read_text(encoding="utf-8")):
         if language == "python":
             runs = [("python", block, [sys.executable, "-c", block])]
         elif language in ("sh", "bash", "shell", "console"):
             runs = [("shell", c, ["bash", "-euo", "pipefail", "-c", c]) for c in _commands(block)]
         else:
             continue
+        printed: list[str] = []
         for kind, source, command in runs:
             out = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
             assert out.returncode == 0, f"{source}\n{out.stdout}\n{out.stderr}"
             assert out.stdout or kind == "python", f"{source}\nprinted nothing"
+            printed += [line.rstrip() for line in out.stdout.splitlines()]
             done[kind].append(source)
+        if language == "console":
+            shown = [line for line in block.splitlines() if not line.startswith("$ ") and line != "..."]
+            assert [line for line in shown if line not in printed] == [], "the page shows what is not printed"
     return done
 
 
@@ -63,9 +72,10 @@ def test_the_readmes_commands_run_as_pasted(pasted: dict[str, list[str]]) -> Non
     assert any(command.startswith("rthstrack evaluate") for command in pasted["shell"])
 
 
-def test_what_the_readme_shows_and_links_to_is_there(root: Path) -> None:
-    text = (root / "README.md").read_text(encoding="utf-8")
+@pytest.mark.parametrize("page", PAGES)
+def test_what_the_page_shows_and_links_to_is_there(root: Path, page: str) -> None:
+    text = (root / page).read_text(encoding="utf-8")
     links = re.findall(r"\]\(([^)#\s]+)\)|(?:src|href)=\"([^\"#]+)\"", text)
     local = [a or b for a, b in links if "://" not in (a or b)]
-    assert local, "the README shows no picture and links to nothing in the repository"
-    assert [link for link in local if not (root / link).exists()] == []
+    assert local, "the page shows no picture and links to nothing in the repository"
+    assert [link for link in local if not ((root / page).parent / link).exists()] == []

@@ -120,6 +120,13 @@ def test_agreement_is_said_in_a_word() -> None:
     assert found.variants == {}
 
 
+def test_agreement_within_a_wide_interval_is_said_to_be_worth_little() -> None:
+    found = assessed(burst(), burst(0.01) + noise(5))
+    low, high = found.trusted.delay_interval_s
+    assert high - low > 0.002  # the test's own premise: more than a tenth of 10 ms to either side
+    assert "wide" in found.argument
+
+
 @pytest.mark.parametrize(
     ("cause", "target", "measured", "settings", "remedy"),
     [
@@ -162,6 +169,16 @@ def test_a_delay_that_varies_is_told_with_its_slope_instead_of_one_number() -> N
     assert not any("not one number" in warning for warning in found.warnings)
 
 
+def test_a_delay_that_varies_a_little_is_one_number_with_its_slope_added() -> None:
+    # d(f) = 20 ms - 0.1 ms f / Hz: 5 % less at 10 Hz than at 0.5 Hz.
+    found = assessed(broad(), broad(filtered=lambda f: np.exp(-2j * np.pi * f * (0.02 - 1e-4 * f))))
+    sentence, _, slope = found.argument.partition("; ")
+    assert sentence.startswith("use the trusted estimate: ")
+    words = slope.split()
+    assert words[:5] == ["the", "delay", "is", "falling", "by"]
+    assert float(words[5]) == pytest.approx(0.1, rel=physical(1, "%"))
+
+
 def test_a_delay_that_changes_over_time_is_told_with_its_range() -> None:
     delay_s = 0.01 + 0.02 * T / T[-1]
     measured = np.interp(T - delay_s, T, broad()) + noise(0.02)
@@ -175,6 +192,12 @@ def test_noise_on_target_is_not_taken_for_a_change_over_time() -> None:
     assert "over time" not in found.argument
 
 
+def test_foreign_motion_is_not_taken_for_a_change_over_time() -> None:
+    found = assessed(burst(), burst(0.01) + 20 * broad(seed=9))
+    assert "over time" not in found.argument
+    assert any("coherence" in warning for warning in found.warnings)
+
+
 def test_a_warning_that_the_argument_says_is_not_given_twice() -> None:
     found = assessed(burst() + 8, burst(0.01) + 8)
     assert "an offset" in found.argument
@@ -183,9 +206,9 @@ def test_a_warning_that_the_argument_says_is_not_given_twice() -> None:
 
 # ------------------------------------------------------------------------------------------------- what is missing
 
-# "few cycles" is not here: what a straight line leaves of any motion goes through about a cycle.
 UNDETERMINED = [
     ("too little motion", burst(), np.zeros(N), {}),
+    ("of a cycle", np.sin(T / 50), np.sin((T - 0.02) / 50) + noise(1e-4), {}),
     ("of measured follows target", broad(), broad(seed=9), {}),
     ("ambiguous", sine(T), sine(T - 0.02) + noise(1e-3), {"max_delay_s": 0.3}),
     ("beyond max_delay_s", broad(), broad(0.09), {"max_delay_s": 0.05}),
@@ -420,6 +443,23 @@ def test_the_figure_shows_both_estimates_with_a_band() -> None:
     assert len(amplitude_axis.collections) == len(delay_axis.collections) == 1
     gain_axis, own_delay_axis, _ = plots.plot_frequency_response(found)
     assert len(gain_axis.collections) == len(own_delay_axis.collections) == 1
+
+
+def test_the_page_says_why_there_is_no_interval() -> None:
+    page = report_html([assessed(broad(), broad(filtered=first_order))])
+    assert 'data-field="trusted_reason">no interval: ' in page
+    assert "trusted_reason" not in report_html([assessed(burst(), burst(0.01) + noise(0.1))])
+
+
+def test_windows_without_numbers_are_counted_by_their_kind_of_reason() -> None:
+    measured = np.where(T < 22, burst(0.01), 3 * broad(seed=9)) + noise(0.05)
+    moving = assessed(burst(), measured).trusted_moving
+    assert moving is not None
+    counted = rthstrack.display.reasons(moving)
+    assert sum(n for n, _ in counted) == sum(bool(reason) for reason in moving.reason)
+    assert [n for n, _ in counted] == sorted((n for n, _ in counted), reverse=True)
+    assert len(counted) == len({text.split("(")[0].rstrip("0123456789. ") for _, text in counted})
+    assert all(text in moving.reason for _, text in counted)
 
 
 def test_the_page_holds_both_estimates() -> None:

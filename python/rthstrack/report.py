@@ -646,8 +646,16 @@ def _heading(a: Assessment) -> str:
         f'<p class="facts">{" · ".join(facts)}</p>'
         f'<h2 class="verdict" data-field="verdict">{escape(a.verdict)}</h2>'
         f'<p class="argument" data-field="argument">{escape(a.argument)}</p>'
-        + _notice("exceeded", ("Limit exceeded", "Limits exceeded"), a.exceeded)
+        f"{_trusted_reason(a)}" + _notice("exceeded", ("Limit exceeded", "Limits exceeded"), a.exceeded)
     )
+
+
+def _trusted_reason(a: Assessment) -> str:
+    """Why the trusted estimate or its interval is missing, where the argument does not say so."""
+    text = reason(a.trusted)
+    if text is None or _why(text) in a.argument:
+        return ""
+    return f'<p class="argument muted" data-field="trusted_reason">{escape(text)}</p>'
 
 
 def _key_numbers(a: Assessment) -> str:
@@ -660,13 +668,13 @@ def _key_numbers(a: Assessment) -> str:
         (
             "Amplitude A",
             _number("amplitude", amplitude, reason=reasons.get("amplitude")),
-            _beside(a, "amplitude") or "1 is perfect",
+            _beside(a, "amplitude", "1 is perfect"),
             _limit("limit_amplitude", "1 \N{PLUS-MINUS SIGN} ", abs(amplitude - 1), a.limits.amplitude),
         ),
         (
             "Delay d",
             _number("delay_s", delay_s, "ms", 1e3, reasons.get("delay_s")),
-            _beside(a, "delay_s") or (sense if math.isfinite(delay_s) else ""),
+            _beside(a, "delay_s", sense if math.isfinite(delay_s) else ""),
             _limit("limit_delay_s", "\N{PLUS-MINUS SIGN}", abs(delay_s), a.limits.delay_s, "ms", 1e3),
         ),
         (
@@ -688,14 +696,15 @@ def _key_numbers(a: Assessment) -> str:
     return f'<dl class="tiles">{tiles}</dl>{_index_tiles(a, target_role, measured_role, reasons)}'
 
 
-def _beside(a: Assessment, name: str) -> str:
-    """Which estimate the tile shows, its interval if it has one, and the trusted one with its own."""
+def _beside(a: Assessment, name: str, note: str) -> str:
+    """What the tile's number is, its interval if it has one, and the trusted one with its own."""
     t = a.trusted
     unit, factor = ("ms", 1e3) if name == "delay_s" else ("", 1.0)
     field = "delay_interval_s" if name == "delay_s" else "amplitude_interval"
-    parts = ["as published" if a.tracking.settings.estimator == "fei" else _ESTIMATORS[a.tracking.settings.estimator]]
-    if own := _interval(field, getattr(a.tracking, field), float(getattr(a.tracking, name)), unit, factor):
-        parts.append(own)
+    parts = [f"{_ESTIMATORS[a.tracking.settings.estimator]}; {note}".removesuffix("; ")]
+    own = float(getattr(a.tracking, name))
+    if a.tracking.settings.estimator != "fei" and math.isfinite(own):
+        parts.append(_interval(field, getattr(a.tracking, field), own, unit, factor) or "no interval")
     if t is not a.tracking:
         value = float(getattr(t, name))
         parts.append(f"trusted: {_number(f'trusted_{name}', value, unit, factor)}")
@@ -760,9 +769,9 @@ def _time_charts(a: Assessment, drawing: Mapping[str, Any]) -> str:
         m = a.moving
         text = (
             f"{int(np.count_nonzero(m.valid))} of {m.time_s.size} windows of {m.window_s:.4g} s "
-            f"judged, one every {m.hop_s:.4g} s, drawn at the window's centre. Grey: {target_role} "
-            "moves too little in the window to judge by (standard deviation below "
-            f"{m.minimum_std_ratio:.3g} of the record's)."
+            f"judged, one every {m.hop_s:.4g} s, drawn at the window's centre. Grey: not judged, most often as "
+            f"{target_role} moves too little in the window (standard deviation below {m.minimum_std_ratio:.3g} of the "
+            "record's)."
         )
         moving = _chart("moving-amplitude", "Amplitude over time")
         moving += _chart(

@@ -43,8 +43,12 @@ _DELAY_SPREAD = 0.2
 _SAME_DELAY, _SAME_DELAY_S = 1e-3, 1e-6
 # Without an interval to hold the difference against, one of a hundredth counts.
 _NOTABLE = 1e-2
+# An interval that reaches further than this share of the delay to either side says little of it.
+_WIDE_INTERVAL = 0.1
 # A change of one setting is the cause of a difference when it leaves less than this share of it.
 _EXPLAINED = 0.5
+# A number that changes by more than this share over the frequencies of the energy is quoted with its slope only.
+_MISLEADING = 0.1
 # Phases that spread less than this average well.
 _WIDE_RAD = math.pi / 6
 # Over time: the middle eight tenths of the windows differ by this share, and by this many of their own half intervals.
@@ -142,23 +146,25 @@ def argument(
     if (missing := _undetermined(trusted)) is not None:
         said = "no number can be trusted here" if _undetermined(tracking) is None else "there is no number to use"
         return f"{said}: {missing}{_ADVICE.get(missing, '')}", None
-    if (unsteady := _unsteady(trusted_moving)) is not None:
+    # Foreign motion in measured comes and goes; it is not the actuator that changes.
+    if "coherence" not in found and (unsteady := _unsteady(trusted_moving)) is not None:
         name, text = unsteady
         return f"{text}; {_averages(tracking, trusted, name)}", None
-    if slopes is not None and slopes.delay_varies:
+    if slopes is not None and slopes.delay_varies and _change(slopes, "delay") > _MISLEADING:
         return f"{_varying_delay(slopes)}; {_averages(tracking, trusted)}", "delay spread"
-    if slopes is not None and slopes.gain_varies:
+    if slopes is not None and slopes.gain_varies and _change(slopes, "gain") > _MISLEADING:
         return f"{_varying_gain(slopes)}; {_averages(tracking, trusted, 'amplitude')}", None
+    slowly = _varying_slowly(slopes)
     if tracking is trusted:
         interval = "with its interval" if not trusted.reason else f"for which there is {trusted.reason}"
-        return f"this is the trusted estimate, {interval}", None
+        return f"this is the trusted estimate, {interval}{slowly}", None
     ours = _NAMES[tracking.settings.estimator]
     which = _differences(tracking, trusted)
     if not which:
-        return f"{ours} agrees with the trusted estimate {_how_well(tracking, trusted)}", None
+        return f"{ours} agrees with the trusted estimate {_how_well(tracking, trusted)}{slowly}", None
     cause, text = _cause(target, tracking, trusted, which, slopes, variants, found)
     gap = " and ".join(_gap(name, tracking, trusted) for name in which)
-    return f"use the trusted estimate: {ours} is {gap}, {text}", cause
+    return f"use the trusted estimate: {ours} is {gap}, {text}{slowly}", cause
 
 
 def _how_well(tracking: Tracking, trusted: Tracking) -> str:
@@ -171,7 +177,12 @@ def _how_well(tracking: Tracking, trusted: Tracking) -> str:
             (float(tracking.amplitude), trusted.amplitude_interval),
         )
     )
-    return "within its interval" if inside else "to a thousandth"
+    if not inside:
+        return "to a thousandth"
+    low, high = (1e3 * float(end) for end in trusted.delay_interval_s)
+    if (high - low) / 2 > _WIDE_INTERVAL * 1e3 * abs(float(trusted.delay_s)):
+        return f"within its interval, but that is wide: {low:.2g} to {high:.2g} ms"
+    return "within its interval"
 
 
 def _averages(tracking: Tracking, trusted: Tracking, name: str = "delay_s") -> str:
@@ -203,6 +214,27 @@ def _line(value: float, interval: tuple[float, float], factor: float, what: str)
         return "bent over the frequencies"
     number, _, between = with_interval(factor * abs(value), ends).partition(" ")
     return f"{'rising' if value > 0 else 'falling'} by {number}{what} a hertz {between}".rstrip()
+
+
+def _change(s: FrequencySlopes, what: str) -> float:
+    """How much gain or delay change over the band, by slope and bend, as a share of themselves."""
+    value, slope, misfit = (
+        (s.gain, s.gain_per_hz, s.gain_misfit) if what == "gain" else (s.delay_s, s.delay_s_per_hz, s.delay_misfit_s)
+    )
+    change = abs(slope) * (s.band_hz[1] - s.band_hz[0]) + 2 * misfit
+    return change / abs(value) if value else math.inf
+
+
+def _varying_slowly(s: FrequencySlopes | None) -> str:
+    """What is added to a number that changes with frequency, but by too little to mislead."""
+    if s is None:
+        return ""
+    changes = []
+    if s.delay_varies:
+        changes.append(f"the delay is {_line(s.delay_s_per_hz, s.delay_s_per_hz_interval, 1e3, ' ms')}")
+    if s.gain_varies:
+        changes.append(f"the gain is {_line(s.gain_per_hz, s.gain_per_hz_interval, 1.0, '')}")
+    return f"; {' and '.join(changes)}" if changes else ""
 
 
 def _varying_delay(s: FrequencySlopes) -> str:
@@ -246,13 +278,13 @@ def _unsteady(moving: MovingTracking | None) -> tuple[str, str] | None:
         steps = (values[apart:] - values[:-apart])[pairs]
         if steps.size < _STEADY_WINDOWS or np.mean(steps**2) > _GRADUAL * 2 * np.var(values[known]):
             continue
-        # Where the motion's frequency changes over time, it is the frequency that tells of the actuator.
-        f_eq = moving.equivalent_frequency_hz[known]
-        if np.std(f_eq) > 0 and np.corrcoef(values[known], f_eq)[0, 1] ** 2 > _BY_FREQUENCY:
-            continue
         low, high = (float(end) for end in np.quantile(values[known], (0.1, 0.9)))
         noise = float(np.median(interval[known, 1] - interval[known, 0])) / 2
         if high - low > max(_UNSTEADY * abs(float(np.median(values[known]))), _UNSTEADY_INTERVALS * noise):
+            # Where the motion's frequency changes over time, it is the frequency that tells of the actuator.
+            f_eq = moving.equivalent_frequency_hz[known]
+            if np.std(f_eq) > 0 and np.corrcoef(values[known], f_eq)[0, 1] ** 2 > _BY_FREQUENCY:
+                continue
             span = f"{factor * low:.3g} to {factor * high:.3g}{unit}"
             what = name.removesuffix("_s")
             share = f"in 80 % of the windows of {moving.window_s:.3g} s"
