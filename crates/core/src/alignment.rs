@@ -33,7 +33,7 @@ const MAX_STEPS: usize = 24;
 /// A step this short, in samples, is the last: what it leaves is its square.
 const LAST_STEP: f64 = 1e-4;
 /// The same where the slope has been measured, noise and all.
-const LAST_SECANT_STEP: f64 = 1e-2;
+const LAST_SECANT_STEP: f64 = 2e-3;
 /// Fewest samples that are judged.
 const MIN_SUPPORT: usize = 16;
 /// Fewest cycles of the target in the window: more than half a wave, whose delay cannot be told from an offset.
