@@ -89,7 +89,7 @@ test-python: .venv/built ## Python tests; browser tests where there is a Chromiu
 	@$(BIN)/pytest -n auto --dist loadfile
 
 .PHONY: fuzz
-fuzz: .venv/built toolchain ## damaged input at length: 200,000 for our reader, 5,000 for each library's
+fuzz: .venv/built toolchain ## odd input at length: 200,000 for our reader and for the evaluation, 5,000 for each library's reader
 	$(call say,fuzz tests)
 	@mkdir -p $(OUT)
 	@RTHSTRACK_FUZZ=200000 cargo test --workspace --locked --test fuzz 2>&1 | tee $(OUT)/fuzz.log

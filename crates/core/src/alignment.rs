@@ -333,13 +333,13 @@ impl Alignment {
         mut support: Range<usize>,
     ) -> std::result::Result<Tracking, Reason> {
         if self.estimator == Estimator::Aligned {
-            let tracking = self.align(state, view, start, &support, best)?;
+            let tracking = self.align(state, view, start, support, best)?;
             self.check_delay(tracking.delay_s * self.rate_hz)?;
             return Ok(tracking);
         }
         if !self.in_time && self.noise_ratio == 0.0 {
             // Other frequencies may have another delay: a part of a period away at most.
-            let room = (0.2 * self.n_samples as f64 / peaks.cycles).clamp(2.0, self.search.reach() as f64);
+            let room = (0.2 * self.n_samples as f64 / peaks.cycles).min(self.search.reach() as f64).max(2.0);
             support = self.support(view, start, best.tau - room, best.tau + room);
             let goodness = best.goodness;
             best = Fit { goodness, ..self.refine(state, view, start, &support, best.tau, room, true)? };
@@ -405,7 +405,8 @@ impl Alignment {
         in_bins: bool,
     ) -> std::result::Result<(Fit, Range<usize>), Reason> {
         let room = step as f64 + 2.0;
-        let around = |least: f64, most: f64| self.support(view, start, least - room - 1.0, most + room + 1.0);
+        // Each later look may go one sample further.
+        let around = |least: f64, most: f64| self.support(view, start, least - room - 3.0, most + room + 3.0);
         let distance = |lag: f64| expected.map_or(0.0, |expected| (lag - expected).abs());
         let Some(highest) = peaks.first() else { return Err(Reason::Still) };
         // One peak, or the highest is nearest to the expected delay: nothing to choose between.
@@ -461,6 +462,13 @@ impl Alignment {
         from..to.max(from)
     }
 
+    fn check_support(&self, support: &Range<usize>) -> std::result::Result<(), Reason> {
+        if support.len() < MIN_SUPPORT || 2 * support.len() < self.n_samples {
+            return Err(Reason::TooShort { n_samples: support.len() });
+        }
+        Ok(())
+    }
+
     /// Newton's steps from `tau`, at most `room` samples away from it, on sums over samples or over the kept bins.
     fn refine(
         &self,
@@ -472,9 +480,7 @@ impl Alignment {
         room: f64,
         in_bins: bool,
     ) -> std::result::Result<Fit, Reason> {
-        if support.len() < MIN_SUPPORT || 2 * support.len() < self.n_samples {
-            return Err(Reason::TooShort { n_samples: support.len() });
-        }
+        self.check_support(support)?;
         self.place_measured(state, view, start, support);
         if in_bins {
             self.kept.spectrum.transform_one(
@@ -694,7 +700,7 @@ impl Alignment {
         state: &mut AlignmentState,
         view: &View<'_>,
         start: usize,
-        support: &Range<usize>,
+        mut support: Range<usize>,
         mut fit: Fit,
     ) -> std::result::Result<Tracking, Reason> {
         let from = fit.tau;
@@ -704,7 +710,15 @@ impl Alignment {
         self.kept.spectrum.transform_one(&mut state.scratch, &state.signals.measured, None, &mut state.bins[MEASURED]);
         for _ in 0..MAX_STEPS {
             let tau = fit.tau;
-            self.place_target(state, view, start, support, tau);
+            let known = self.support(view, start, tau, tau);
+            if support.start < known.start || known.end < support.end {
+                support = self.support(view, start, tau - 1.0, tau + 1.0);
+                self.check_support(&support)?;
+                self.place_measured(state, view, start, &support);
+                let AlignmentState { signals, bins, scratch, .. } = &mut *state;
+                self.kept.spectrum.transform_one(scratch, &signals.measured, None, &mut bins[MEASURED]);
+            }
+            self.place_target(state, view, start, &support, tau);
             let AlignmentState { signals, bins: [y, v, o], scratch, .. } = &mut *state;
             self.kept.spectrum.transform_one(scratch, &signals.shifted, None, y);
             let sums = |a: &[Complex<f64>], b: &[Complex<f64>]| {
@@ -743,7 +757,7 @@ impl Alignment {
             if step.abs() < last_step {
                 fit = Fit { tau: tau + step, step, gain: fei.norm() * (1.0 + growth * step), ..fit };
                 let averaged = Averaged { equivalent_frequency_hz, power: found.power, slope, growth };
-                let mut tracking = self.finish(state, start, support, &fit, Some(averaged));
+                let mut tracking = self.finish(state, start, &support, &fit, Some(averaged));
                 if self.weight_power != 2 && tracking.reason.is_none() {
                     tracking = tracking.without_interval(Reason::WeightPower);
                 }

@@ -266,15 +266,32 @@ fn odd_samples_are_answered() {
     let white = noise(n, 5);
     let quantised: Vec<f64> = white.iter().map(|v| v.round()).collect();
     let large: Vec<f64> = white.iter().map(|v| v + 1e9).collect();
-    let all = [spikes, step, ramp, white, quantised, large];
+    let walk: Vec<f64> = noise(n, 8)
+        .iter()
+        .scan(0.0, |sum, v| {
+            *sum += v;
+            Some(*sum)
+        })
+        .collect();
+    let all = [spikes, step, ramp, white, quantised, large, walk];
+    let aligned = |weight_power| EvaluatorConfig { estimator: Estimator::Aligned, weight_power, ..Default::default() };
+    let noisy = |noise, noise_ratio| EvaluatorConfig { noise, noise_ratio, ..least_squares() };
+    let kinds = [
+        aligned(2),
+        aligned(3),
+        noisy(Noise::White, 0.0),
+        noisy(Noise::Coloured, 0.0),
+        noisy(Noise::White, 0.5),
+        EvaluatorConfig { data_decimation: 2, frequency_decimation: 2, ..least_squares() },
+    ];
     for target in &all {
         for measured in &all {
             for len in [4, 5, 16, 63, 64, 300, n] {
-                for (noise, noise_ratio) in [(Noise::White, 0.0), (Noise::Coloured, 0.0), (Noise::White, 0.5)] {
-                    for window in [Window::Boxcar, Window::Hann] {
-                        let config = EvaluatorConfig { noise, noise_ratio, window, ..least_squares() };
+                for kind in kinds {
+                    for (window, detrend) in [(Window::Boxcar, Detrend::None), (Window::Hann, Detrend::Mean)] {
+                        let config = EvaluatorConfig { window, detrend, ..kind };
                         let Ok(pair) = Pair::new(&target[..len], &measured[..len], RATE_HZ) else { continue };
-                        let evaluator = Evaluator::new(len, RATE_HZ, config).unwrap();
+                        let Ok(evaluator) = Evaluator::new(len, RATE_HZ, config) else { continue };
                         let found = evaluator.evaluate(&mut evaluator.state(), &pair).unwrap();
                         let undetermined = found.reason.is_some_and(|r| r.is_undetermined());
                         assert_eq!(found.delay_s.is_nan(), undetermined, "{found:?}");

@@ -1,0 +1,112 @@
+//! Any finite samples under any settings give a number, a reason or an error, and never a panic. `RTHSTRACK_FUZZ` sets how many.
+
+use rthstrack::{
+    Decimator, Detrend, Estimator, Evaluator, EvaluatorConfig, MovingConfig, Noise, Pair, Window, evaluate_moving,
+};
+
+/// A multiplicative congruential generator: the same cases on every machine.
+struct Random(u64);
+
+impl Random {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        (self.uniform() * n as f64) as usize
+    }
+
+    fn pick<T: Copy>(&mut self, of: &[T]) -> T {
+        of[self.below(of.len())]
+    }
+
+    /// Samples of one of many kinds.
+    fn signal(&mut self, n: usize) -> Vec<f64> {
+        let kind = self.below(8);
+        let (frequency, scale, level) =
+            (self.uniform(), self.pick(&[1.0, 1e-9, 1e12]), self.pick(&[0.0, 0.0, 1e6, -3.0]));
+        let mut state = 0.0;
+        (0..n)
+            .map(|i| {
+                let x = 2.0 * self.uniform() - 1.0;
+                let t = i as f64;
+                let v = match kind {
+                    0 => x,
+                    1 => {
+                        state += x;
+                        state
+                    }
+                    2 => (frequency * t).sin(),
+                    3 => (frequency * t).sin() + 0.01 * x,
+                    4 => f64::from(u8::from(i > n / 3)),
+                    5 => t * frequency,
+                    6 => (4.0 * x).round(),
+                    _ => {
+                        state = 0.99 * state + x;
+                        state * (-t / (1.0 + n as f64 * frequency)).exp()
+                    }
+                };
+                level + scale * v
+            })
+            .collect()
+    }
+}
+
+#[test]
+fn any_finite_samples_are_answered() {
+    let cases: u64 = std::env::var("RTHSTRACK_FUZZ").ok().and_then(|n| n.parse().ok()).unwrap_or(1500);
+    let (mut determined, mut answered) = (0, 0);
+    for case in 0..cases {
+        let mut random = Random(case.wrapping_mul(0x9e37_79b9_7f4a_7c15) + 1);
+        let n = random.pick(&[4, 5, 17, 40, 64, 100, 257, 600, 1025]);
+        let rate_hz = random.pick(&[50.0, 200.0, 1024.0, 4096.0]);
+        let target = random.signal(n);
+        let mut measured = random.signal(n);
+        if random.below(3) > 0 {
+            // Late or early by whole samples, and noisy.
+            let lag = random.below(n.min(40)) as isize - 10;
+            for i in 0..n {
+                let from = (i as isize - lag).clamp(0, n as isize - 1) as usize;
+                measured[i] = 0.9 * target[from] + 1e-3 * measured[i];
+            }
+        }
+        let low = random.uniform() * rate_hz / 4.0;
+        let config = EvaluatorConfig {
+            estimator: random.pick(&Estimator::NAMES).1,
+            data_decimation: random.pick(&[1, 1, 1, 2, 16]),
+            frequency_decimation: random.pick(&[1, 1, 1, 2, 8]),
+            decimator: random.pick(&[Decimator::Spectral, Decimator::Spectral, Decimator::Chebyshev]),
+            weight_power: random.pick(&[2, 2, 2, 1, 5]),
+            window: random.pick(&Window::NAMES).1,
+            detrend: random.pick(&Detrend::NAMES).1,
+            band_hz: random.pick(&[None, None, Some((low, low + rate_hz / 8.0))]),
+            max_delay_s: random.pick(&[0.25, 1e-3, 10.0]),
+            noise: random.pick(&[Noise::White, Noise::White, Noise::Coloured]),
+            noise_ratio: random.pick(&[0.0, 0.0, 0.0, 0.3]),
+        };
+        let Ok(pair) = Pair::new(&target, &measured, rate_hz) else { continue };
+        let Ok(evaluator) = Evaluator::new(n, rate_hz, config) else { continue };
+        if let Ok(found) = evaluator.evaluate(&mut evaluator.state(), &pair) {
+            answered += 1;
+            if config.estimator != Estimator::Fei {
+                let undetermined = found.reason.is_some_and(|r| r.is_undetermined());
+                assert_eq!(found.delay_s.is_nan(), undetermined, "case {case}: {config:?} {found:?}");
+                assert_eq!(found.amplitude.is_nan(), undetermined, "case {case}: {config:?} {found:?}");
+                assert_eq!(found.delay_interval_s.0.is_nan(), found.reason.is_some(), "case {case}: {found:?}");
+                if !undetermined {
+                    determined += 1;
+                    assert!(found.delay_s.abs() <= config.max_delay_s * (1.0 + 1e-6), "case {case}: {found:?}");
+                }
+            }
+        }
+        let moving = MovingConfig {
+            window_s: (n / 3) as f64 / rate_hz,
+            hop_s: (n / 7).max(1) as f64 / rate_hz,
+            minimum_std_ratio: 0.0,
+            evaluator: config,
+        };
+        let _ = evaluate_moving(&pair, &moving);
+    }
+    assert!(determined * 20 > answered, "{determined} of {answered} were determined");
+}
