@@ -11,11 +11,18 @@
 //! are solved for tau by Newton's steps. With noise on the target, lambda is the ratio of the noise variances and g what the
 //! interpolation leaves of the target's noise. In time where all bins are kept, over the kept bins otherwise.
 
+mod grid;
+mod products;
+mod weighting;
+
 use std::ops::Range;
 
 use num_complex::Complex;
 use pulp::{Arch, Simd, WithSimd};
 
+use crate::alignment::grid::Grid;
+use crate::alignment::products::{Cross, Multiply, Products};
+use crate::alignment::weighting::{Energies, Weighting};
 use crate::error::Result;
 use crate::lag::{Peak, Peaks, Search, SearchState, View};
 use crate::lagrange::{AFTER, BEFORE, NODES, Taps};
@@ -23,7 +30,7 @@ use crate::noise::{
     Autoregression, Influence, MAX_ORDER, NoisyTarget, Precision, Sampling, Spread, SpreadState, cell_width,
 };
 use crate::reason::Reason;
-use crate::spectrum::{Bins, LANES, Scratch, Sink, Spectrum, SpectrumConfig};
+use crate::spectrum::{Scratch, SpectrumConfig};
 use crate::sums;
 use crate::tracking::{Estimator, EvaluatorConfig, Noise, Tracking, centroid, weigh};
 use crate::window::{Detrend, Window};
@@ -42,8 +49,6 @@ const MIN_CYCLES: f64 = 0.6;
 const MIN_GOODNESS: f64 = 0.1;
 /// Two delays fit equally well if the likelihood of one is below exp(10) times that of the other.
 const LOG_ODDS: f64 = 10.0;
-/// Energy of the target over its noise from which a few bins count: of noise alone it happens once in 10,000.
-const CLEAR: f64 = 3.0;
 /// Up to this frequency, and the next power of two of it in the rate, precision is looked at where that is enough;
 const LOW_HZ: f64 = 32.0;
 /// where it shortens the transforms by at least this;
@@ -75,59 +80,6 @@ pub(crate) struct Alignment {
     arch: Arch,
 }
 
-/// Bins and how to come to them.
-struct Grid {
-    spectrum: Spectrum,
-    /// Samples that are averaged before the transform.
-    step: usize,
-    /// What makes good the droop of the cascade, or of the averages.
-    correction: Option<Vec<f64>>,
-    /// cos of the bins' frequencies, in radians a sample.
-    cosines: Vec<f64>,
-}
-
-impl Grid {
-    fn new(config: SpectrumConfig) -> Result<Self> {
-        let spectrum = Spectrum::new(config)?;
-        let cosines = radians(&spectrum, config.rate_hz).map(f64::cos).collect();
-        Ok(Self { step: 1, correction: spectrum.correction(), spectrum, cosines })
-    }
-
-    /// The bins up to the rate over 2 `factor`, from averages of a quarter as many samples: what aliases onto the highest of
-    /// them is held to 2 % of its energy, which serves for a variance.
-    fn low(config: SpectrumConfig, factor: usize) -> Result<Self> {
-        let step = factor / 4;
-        let rate_hz = config.rate_hz / step as f64;
-        let band_hz = Some((0.0, config.rate_hz / (2 * factor) as f64));
-        let spectrum =
-            Spectrum::new(SpectrumConfig { n_samples: config.n_samples.div_ceil(step), rate_hz, band_hz, ..config })?;
-        let gain = |w: f64| (0.5 * w * step as f64).sin() / (0.5 * w).sin();
-        let correction = Some(radians(&spectrum, config.rate_hz).map(|w| (step * step) as f64 / gain(w)).collect());
-        let cosines = radians(&spectrum, config.rate_hz).map(f64::cos).collect();
-        Ok(Self { spectrum, step, correction, cosines })
-    }
-
-    /// Length of the zero-padded samples over Q.
-    fn folded_len(&self) -> f64 {
-        (self.step * self.spectrum.folded_len()) as f64
-    }
-
-    fn transform(&self, scratch: &mut Scratch, samples: &[f64], averages: &mut [f64], bins: &mut [Complex<f64>]) {
-        if self.step == 1 {
-            return self.spectrum.transform_one(scratch, samples, None, bins);
-        }
-        sums::block_means(samples, self.step, averages);
-        self.spectrum.transform_one(scratch, averages, None, bins);
-    }
-}
-
-/// Frequencies of the kept bins, in radians a sample of `rate_hz`.
-fn radians(spectrum: &Spectrum, rate_hz: f64) -> impl Iterator<Item = f64> + use<> {
-    let bin = 2.0 * std::f64::consts::PI * spectrum.delta_f_hz() / rate_hz;
-    let first = spectrum.first();
-    (first..first + spectrum.n_bins()).map(move |k| k as f64 * bin)
-}
-
 /// Its buffers.
 #[derive(Debug, Clone)]
 pub(crate) struct AlignmentState {
@@ -144,17 +96,6 @@ pub(crate) struct AlignmentState {
     weighting: Weighting,
 }
 
-/// What a bin counts where both signals are noisy.
-#[derive(Debug, Clone)]
-struct Weighting {
-    /// W_k = 1 - noise / energy around bin k, zero where it does not stand clear of the noise.
-    weights: Vec<f64>,
-    /// sqrt(W_k), times what makes good the droop of the cascade.
-    factors: Vec<f64>,
-    /// sum W_k cos(l omega_k) / sum W_k: how white noise correlates between samples, seen through the weights.
-    correlation: [f64; NODES],
-}
-
 /// n samples each, zero outside the judged ones.
 #[derive(Debug, Clone)]
 struct Signals {
@@ -163,17 +104,6 @@ struct Signals {
     /// The shifted target, and its slope a sample, alike.
     shifted: Vec<f64>,
     slope: Vec<f64>,
-}
-
-/// Inner products of the shifted target y, its slope y' and measured o.
-#[derive(Debug, Clone, Copy, Default)]
-struct Products {
-    yy: f64,
-    yv: f64,
-    vv: f64,
-    oy: f64,
-    ov: f64,
-    oo: f64,
 }
 
 /// Which of the transforms is of measured, later of the residual.
@@ -593,8 +523,7 @@ impl Alignment {
         let pair = |a: &[Complex<f64>], b: &[Complex<f64>]| {
             let mut cross = Cross { correction, first: self.kept.spectrum.first(), ..Cross::default() };
             self.kept.spectrum.visit_pair([a, b], &mut cross);
-            let total = |lanes: [f64; LANES]| lanes.iter().sum::<f64>();
-            (total(cross.first_squared), total(cross.product), total(cross.second_squared))
+            cross.totals()
         };
         let ((yy, yv, vv), (_, oy, oo), (_, ov, _)) = (pair(y, v), pair(y, o), pair(v, o));
         Products { yy, yv, vv, oy, ov, oo }
@@ -947,35 +876,6 @@ fn fraction(tau: f64) -> (isize, f64) {
     (whole as isize, -tau - whole)
 }
 
-impl Weighting {
-    /// From the energies in `weights` and |O_k - K Y_k|^2 in `factors` to the weights, over `width` bins at a time. `share` of
-    /// the residual's energy is the target's noise, which is taken for white.
-    fn learn(&mut self, width: usize, share: f64) {
-        let noise = share * self.factors.iter().sum::<f64>() / self.factors.len() as f64;
-        for weights in self.weights.chunks_mut(width) {
-            let energy = weights.iter().sum::<f64>() / weights.len() as f64;
-            weights.fill(if energy > CLEAR * noise { 1.0 - noise / energy } else { 0.0 });
-        }
-        if self.weights.iter().all(|&w| w == 0.0) {
-            self.weights.fill(1.0);
-        }
-    }
-
-    /// What follows from the weights.
-    fn refresh(&mut self, correction: Option<&[f64]>, cosines: &[f64]) {
-        let mut sums = [0.0; NODES];
-        for (k, (weight, factor)) in self.weights.iter().zip(&mut self.factors).enumerate() {
-            *factor = weight.sqrt() * correction.map_or(1.0, |c| c[k]);
-            let (mut now, mut next) = (*weight, weight * cosines[k]);
-            for sum in &mut sums {
-                *sum += now;
-                (now, next) = (next, 2.0 * cosines[k] * next - now);
-            }
-        }
-        self.correlation = sums.map(|s| s / sums[0]);
-    }
-}
-
 /// sum w^2 and sum w^4
 fn moments(window: &[f64]) -> (f64, f64) {
     (sums::energy(window), sums::fourths(window))
@@ -1009,86 +909,5 @@ impl WithSimd for Shift<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         self.taps.apply(simd, self.samples, self.value, self.slope);
-    }
-}
-
-/// All inner products in one pass, compiled for the processor at hand.
-struct Multiply<'a> {
-    shifted: &'a [f64],
-    slope: &'a [f64],
-    measured: &'a [f64],
-}
-
-impl WithSimd for Multiply<'_> {
-    type Output = Products;
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Products {
-        let (ys, y_rest) = S::as_simd_f64s(self.shifted);
-        let (vs, v_rest) = S::as_simd_f64s(self.slope);
-        let (os, o_rest) = S::as_simd_f64s(self.measured);
-        let mut lanes = [simd.splat_f64s(0.0); 6];
-        for ((y, v), o) in ys.iter().zip(vs).zip(os) {
-            for (lane, (a, b)) in lanes.iter_mut().zip([(y, y), (y, v), (v, v), (o, y), (o, v), (o, o)]) {
-                *lane = simd.mul_add_e_f64s(*a, *b, *lane);
-            }
-        }
-        let mut total = lanes.map(|lane| simd.reduce_sum_f64s(lane));
-        for ((y, v), o) in y_rest.iter().zip(v_rest).zip(o_rest) {
-            for (sum, term) in total.iter_mut().zip([y * y, y * v, v * v, o * y, o * v, o * o]) {
-                *sum += term;
-            }
-        }
-        let [yy, yv, vv, oy, ov, oo] = total;
-        Products { yy, yv, vv, oy, ov, oo }
-    }
-}
-
-/// Keeps (|Y_k|^2 + r^2 |O_k|^2) / 2, r the noise ratio, and |O_k - K Y_k|^2. Noise that lifts the one lifts or lowers the
-/// other as often as not; of |Y_k|^2 alone, weights would favour bins in which the target's noise adds to it.
-struct Energies<'a> {
-    gain: f64,
-    ratio: f64,
-    first: usize,
-    correction: Option<&'a [f64]>,
-    energy: &'a mut [f64],
-    residual: &'a mut [f64],
-}
-
-impl Sink for Energies<'_> {
-    fn take<const W: usize>(&mut self, bins: &Bins<W>) {
-        for i in 0..W {
-            let k = bins.first - self.first + i;
-            let factor = self.correction.map_or(1.0, |c| c[k]);
-            let target = Complex::new(bins.target_re[i], bins.target_im[i]) * factor;
-            let measured = Complex::new(bins.measured_re[i], bins.measured_im[i]) * factor;
-            self.energy[k] = 0.5 * (target.norm_sqr() + self.ratio * self.ratio * measured.norm_sqr());
-            self.residual[k] = (measured - target * self.gain).norm_sqr();
-        }
-    }
-}
-
-/// sum |a|^2, sum Re(a conj b) and sum |b|^2 over the kept bins.
-#[derive(Default)]
-struct Cross<'a> {
-    correction: Option<&'a [f64]>,
-    first: usize,
-    first_squared: [f64; LANES],
-    product: [f64; LANES],
-    second_squared: [f64; LANES],
-}
-
-impl Sink for Cross<'_> {
-    #[inline(always)]
-    fn take<const W: usize>(&mut self, bins: &Bins<W>) {
-        for i in 0..W {
-            let (ar, ai) = (bins.target_re[i], bins.target_im[i]);
-            let (br, bi) = (bins.measured_re[i], bins.measured_im[i]);
-            let factor = self.correction.map_or(1.0, |c| c[bins.first - self.first + i]);
-            let squared = factor * factor;
-            self.first_squared[i] += squared * (ar * ar + ai * ai);
-            self.product[i] += squared * (ar * br + ai * bi);
-            self.second_squared[i] += squared * (br * br + bi * bi);
-        }
     }
 }
