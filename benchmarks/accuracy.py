@@ -518,6 +518,8 @@ INTERVALS: dict[str, dict[str, Any]] = {
     "`least_squares`, Hann": {"estimator": "least_squares", **HANN},
     "`aligned`": {"estimator": "aligned"},
 }
+#: Either takes its interval from the noise that is found, so both are asked to hold in either noise.
+JUDGED_INTERVALS = tuple(INTERVALS)[:2]
 
 
 def coverage(run: Run) -> None:
@@ -556,7 +558,7 @@ def coverage(run: Run) -> None:
                     what = ("gain", "delay")[j]
                     if j == 1:
                         shown.setdefault((name, coefficient), []).append(np.concatenate([[whole], each]))
-                    if name in _judged_intervals(coefficient):
+                    if name in JUDGED_INTERVALS:
                         outside = int(np.sum((each < 93) | (each > 97)))
                         lost = 100 * (1 - there.mean())
                         run.asked(
@@ -575,12 +577,6 @@ def coverage(run: Run) -> None:
                 rows,
             )
     _coverage_figure(run, shown)
-
-
-def _judged_intervals(coefficient: float) -> tuple[str, ...]:
-    """An interval for white noise is asked to hold in white noise; one for coloured noise in both."""
-    white, coloured = list(INTERVALS)[:2]
-    return (coloured,) if coefficient else (white, coloured)
 
 
 def _intervals(run: Run, pair: Pair, coefficient: float, seed: int) -> Floats:

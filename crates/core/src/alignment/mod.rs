@@ -451,10 +451,12 @@ impl Alignment {
             let step = score.value / slope;
             if step.abs() < last_step || above - below < LAST_STEP {
                 let step = step.clamp(-last_step, last_step);
+                let Products { yy, yv, vv, oy, ov, .. } = products;
                 return Ok(Fit {
                     tau: now + step,
                     step,
-                    gain: score.gain,
+                    // The best gain moves with the target, which is y - step y' at the delay found.
+                    gain: score.gain * (1.0 - step * ov / oy) * yy / (yy - 2.0 * step * yv + step * step * vv),
                     products,
                     clean: score.clean,
                     residual: score.residual,
@@ -633,6 +635,7 @@ impl Alignment {
         mut fit: Fit,
     ) -> std::result::Result<Tracking, Reason> {
         let from = fit.tau;
+        let mut slope = f64::NAN;
         let mut last: Option<(f64, f64)> = None;
         // Re sum Y' conj Y / sum |Y|^2, by Parseval: how the amplitude changes with the delay.
         let growth = fit.products.yv / fit.products.yy;
@@ -658,26 +661,29 @@ impl Alignment {
             let equivalent_frequency_hz = found.moment / found.power * self.kept.spectrum.delta_f_hz();
             let per_sample = equivalent_frequency_hz / self.rate_hz;
             let phase = fei.arg();
-            let mut slope = 2.0 * std::f64::consts::PI * per_sample;
             // A slope that is known to the second order makes a longer step the last.
             let mut last_step = LAST_STEP;
             match last {
                 Some((before, value)) => {
                     let secant = (phase - value) / (tau - before);
-                    if secant > 0.1 * slope && secant < 10.0 * slope {
+                    if secant > 0.2 * slope && secant < 5.0 * slope {
                         slope = secant;
                     }
                 }
-                None if self.weight_power == 2 => {
-                    // y moves by -y' a sample: d arg(sum O conj Y) = -Im(sum O conj Y' / sum O conj Y).
-                    self.kept.spectrum.transform_one(scratch, &signals.slope, None, v);
-                    let exact = -(sums(v, o).cross / found.cross).im;
-                    if exact > 0.0 {
+                None => {
+                    slope = 2.0 * std::f64::consts::PI * per_sample;
+                    if self.weight_power == 2 {
+                        // y moves by -y' a sample: d arg(sum O conj Y) = -Im(sum O conj Y' / sum O conj Y). Where the window
+                        // cuts much off the motion it is far from 2 pi f_eq.
+                        self.kept.spectrum.transform_one(scratch, &signals.slope, None, v);
+                        let exact = -(sums(v, o).cross / found.cross).im;
+                        if exact <= 0.0 {
+                            return Err(Reason::NoConvergence);
+                        }
                         slope = exact;
                         last_step = LAST_SECANT_STEP;
                     }
                 }
-                None => {}
             }
             let step = -phase / slope;
             if !step.is_finite() || (tau + step - from).abs() * per_sample > 0.25 {
