@@ -1,6 +1,5 @@
 //! Eqs 6 to 12: one complex number for the whole record.
 
-use std::cell::OnceCell;
 use std::f64::consts::PI;
 
 use num_complex::Complex;
@@ -349,7 +348,7 @@ impl Evaluator {
         if let (Some(alignment), Some(state)) = (&self.alignment, &mut state.alignment) {
             self.check(pair)?;
             pair.check_samples()?;
-            return Ok(alignment.estimate(state, &View::whole(pair), 0, &|| None));
+            return Ok(alignment.estimate(state, &View::whole(pair), 0, None));
         }
         self.published(state, pair)
     }
@@ -696,7 +695,7 @@ pub(crate) struct Moving<'a> {
     pair: &'a Pair<'a>,
     streams: Option<[Stream; 2]>,
     /// Delay of the whole record in samples, which tells a window whose target is one tone which turn it is.
-    expected: OnceCell<Option<f64>>,
+    expected: Option<f64>,
 }
 
 impl Evaluator {
@@ -709,7 +708,8 @@ impl Evaluator {
                 stream(pair.target()).zip(stream(pair.measured())).map(|(target, measured)| [target, measured])
             }
         };
-        Moving { evaluator: self, state: self.state(), pair, streams, expected: OnceCell::new() }
+        let expected = self.alignment.as_ref().and_then(|_| Alignment::expected(pair, self.config.max_delay_s));
+        Moving { evaluator: self, state: self.state(), pair, streams, expected }
     }
 }
 
@@ -719,8 +719,7 @@ impl Moving<'_> {
     pub(crate) fn at(&mut self, start: usize) -> Result<Tracking> {
         let Self { evaluator, state, pair, streams, expected } = self;
         if let (Some(alignment), Some(state)) = (&evaluator.alignment, &mut state.alignment) {
-            let of_all = || *expected.get_or_init(|| Alignment::expected(pair, evaluator.config.max_delay_s));
-            return Ok(alignment.estimate(state, &View::whole(pair), start, &of_all));
+            return Ok(alignment.estimate(state, &View::whole(pair), start, *expected));
         }
         let range = start..start + evaluator.n_samples;
         let window = Pair::new(&pair.target()[range.clone()], &pair.measured()[range], pair.rate_hz())?;

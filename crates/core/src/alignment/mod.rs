@@ -96,9 +96,6 @@ pub(crate) struct AlignmentState {
     weighting: Weighting,
 }
 
-/// The delay that other parts of the record tell, in samples, if they do.
-pub(crate) type Expected<'a> = &'a dyn Fn() -> Option<f64>;
-
 /// n samples each, zero outside the judged ones.
 #[derive(Debug, Clone)]
 struct Signals {
@@ -187,14 +184,13 @@ impl Alignment {
     }
 
     /// Gain and delay over the window that starts at sample `start` of the record; the samples are finite. Of delays that fit
-    /// equally well the one nearest to `expected` (in samples, asked only where it is needed) is taken; without it the answer
-    /// is "ambiguous".
+    /// equally well the one nearest to `expected` (in samples) is taken; without it the answer is "ambiguous".
     pub(crate) fn estimate(
         &self,
         state: &mut AlignmentState,
         view: &View<'_>,
         start: usize,
-        expected: Expected<'_>,
+        expected: Option<f64>,
     ) -> Tracking {
         match self.determine(state, view, start, expected) {
             Ok(tracking) => tracking,
@@ -207,7 +203,7 @@ impl Alignment {
         state: &mut AlignmentState,
         view: &View<'_>,
         start: usize,
-        expected: Expected<'_>,
+        expected: Option<f64>,
     ) -> std::result::Result<Tracking, Reason> {
         let Some(peaks) = self.search.peaks(&mut state.search, view, start) else { return Err(Reason::Still) };
         if peaks.cycles < MIN_CYCLES {
@@ -223,7 +219,7 @@ impl Alignment {
             // Once more at a delay that leaves nothing but noise.
             self.weigh_bins(state, view, start, first.tau);
             let around = Peak { lag: first.tau, correlation: 1.0 };
-            let (best, support) = self.best(state, view, start, &[around], peaks.step, &|| None, true)?;
+            let (best, support) = self.best(state, view, start, &[around], peaks.step, None, true)?;
             return self.complete(state, view, start, &peaks, best, support);
         }
         let (best, support) = self.best(state, view, start, peaks.peaks(), peaks.step, expected, false)?;
@@ -243,12 +239,11 @@ impl Alignment {
                 noise.whiten(&view.measured[part], &mut second[..n]);
                 let view = View { target: &first[..n], measured: &second[..n], origin: from + p };
                 let around = Peak { lag: best.tau, correlation: 1.0 };
-                let found = self.best(state, &view, start, &[around], peaks.step, &|| None, false).and_then(
-                    |(best, support)| {
+                let found =
+                    self.best(state, &view, start, &[around], peaks.step, None, false).and_then(|(best, support)| {
                         // Whitening leaves less of the motion than of the noise; that says nothing of the tracking.
                         self.complete(state, &view, start, &peaks, Fit { goodness, ..best }, support)
-                    },
-                );
+                    });
                 state.whitened = [first, second];
                 return found;
             }
@@ -336,13 +331,12 @@ impl Alignment {
         start: usize,
         peaks: &[Peak],
         step: usize,
-        expected: Expected<'_>,
+        expected: Option<f64>,
         in_bins: bool,
     ) -> std::result::Result<(Fit, Range<usize>), Reason> {
         let room = step as f64 + 2.0;
         // Each later look may go one sample further.
         let around = |least: f64, most: f64| self.support(view, start, least - room - 3.0, most + room + 3.0);
-        let expected = if peaks.len() == 1 { None } else { expected() };
         let distance = |lag: f64| expected.map_or(0.0, |expected| (lag - expected).abs());
         let Some(highest) = peaks.first() else { return Err(Reason::Still) };
         // One peak, or the highest is nearest to the expected delay: nothing to choose between.
