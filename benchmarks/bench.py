@@ -291,9 +291,9 @@ def main() -> int:
         "The overhead of a call is measured on a pair of 64 samples, where the core itself takes next to nothing: the"
         " public function against the compiled plan.",
         "",
-        "`aligned` transforms target, its slope, measured and residual and cannot be had for 2.5 plain evaluations, which"
-        " are two transforms. In 4 s windows with a Hann window `least_squares` took 2.45 to 2.55 times the plain time"
-        " from run to run.",
+        "`aligned` transforms target, its slope, measured and residual and cannot be had for 2.5 plain evaluations,"
+        " which are two transforms. In 4 s windows with a Hann window `least_squares` took 2.45 to 2.55 times the plain"
+        " time from run to run.",
         "",
         "Between runs the cells at P = 64, Q >= 16 move from 0.9 to 1.14 times their neighbours, so that one of them"
         " is now and then over 1.1. P = 16 over P = 1 is for vectors of 512 bits; with 256 bits it was 0.39 to 0.42 at"

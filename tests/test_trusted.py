@@ -471,3 +471,15 @@ def test_the_page_holds_both_estimates() -> None:
     record = result_record(found)
     assert record["trusted"]["delay_interval_s"] == [low, high]
     assert record["trusted_moving"]["n_intervals"] > 0
+
+
+def test_an_estimate_that_is_not_determined_is_not_said_to_agree_and_keeps_no_limit() -> None:
+    t = np.arange(8192) / 1024
+    target = np.exp(-(((t - 4) / 1.5) ** 2)) * np.sin(2 * np.pi * 1.7 * t)
+    measured = np.exp(-(((t - 4.03) / 1.5) ** 2)) * np.sin(2 * np.pi * 1.7 * (t - 0.03))
+    settings = rthstrack.Settings(estimator="aligned", max_delay_s=0.01)
+    found = rthstrack.assess(target, measured, 1024, settings=settings, limits=rthstrack.Limits(delay_s=0.001))
+    assert found.exceeded == ()
+    assert found.warnings[0] == "no limit was checked: gain and delay are not determined"
+    assert "agrees" not in found.argument
+    assert "beyond" in str(found.tracking.reason)

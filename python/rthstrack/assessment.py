@@ -152,7 +152,7 @@ def assess(
     except (SettingError, SignalError) as error:
         if asked:
             raise type(error)(f"moving windows of {window_s:g} s: {error}") from None
-        moving, moving_note = None, f"not determined: {error}"
+        moving, trusted_moving, moving_note = None, None, f"not determined: {error}"
     slopes, slopes_note = None, None
     # Where one delay explains measured, segments are aligned at it: bursts and drift would lead the search for another.
     explained = math.isfinite(float(trusted.delay_interval_s[0]))
@@ -196,7 +196,10 @@ def assess(
         settings=evaluation | {"moving_s": window_s, "hop_s": hop_s} | dict(origin or {}),
         verdict=words.sentence(tracking, *signal_roles(part)),
         argument=argument,
-        warnings=tuple(text for name, text in warnings.items() if name != said),
+        warnings=(
+            *words.unchecked(tracking, limits),
+            *(text for name, text in warnings.items() if name != said),
+        ),
         limits=limits,
         exceeded=words.exceeded(tracking, limits),
         factors=factors,

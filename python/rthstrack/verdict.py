@@ -146,6 +146,9 @@ def argument(
     if (missing := _undetermined(trusted)) is not None:
         said = "no number can be trusted here" if _undetermined(tracking) is None else "there is no number to use"
         return f"{said}: {missing}{_ADVICE.get(missing, '')}", None
+    if (missing := _undetermined(tracking)) is not None:
+        asked_for = _NAMES[tracking.settings.estimator]
+        return f"use the trusted estimate: {asked_for} is not determined: {missing}", None
     # Foreign motion in measured comes and goes; it is not the actuator that changes.
     if "coherence" not in found and (unsteady := _unsteady(trusted_moving)) is not None:
         name, text = unsteady
@@ -307,7 +310,8 @@ def _cause(
     """
 
     def relative(name: str) -> float:
-        return abs(float(getattr(tracking, name)) / float(getattr(trusted, name)) - 1)
+        known = float(getattr(trusted, name))
+        return abs(float(getattr(tracking, name)) / known - 1) if known else math.inf
 
     name = max(which, key=relative)
     ours, theirs = float(getattr(tracking, name)), float(getattr(trusted, name))
@@ -400,6 +404,13 @@ def exceeded(tracking: Tracking, limits: Limits) -> tuple[str, ...]:
     if limits.amplitude is not None and error > limits.amplitude:
         found.append(f"|amplitude - 1| {error:.4g} exceeds the limit of {limits.amplitude:.4g}")
     return tuple(found)
+
+
+def unchecked(tracking: Tracking, limits: Limits) -> tuple[str, ...]:
+    """That a limit could not be checked, as there is no number to hold against it."""
+    if (limits.delay_s is None and limits.amplitude is None) or _undetermined(tracking) is None:
+        return ()
+    return ("no limit was checked: gain and delay are not determined",)
 
 
 def warnings(

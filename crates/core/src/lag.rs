@@ -11,13 +11,14 @@
 use pulp::{Arch, NullaryFnOnce};
 
 use crate::pair::Pair;
+use crate::reason::Reason;
 use crate::sums;
 use crate::window::Detrend;
 
 /// Averaging may cost this share of the target's energy.
 const KEPT_ENERGY: f64 = 0.9;
 /// Samples that are averaged at most.
-const MAX_STEP: usize = 64;
+pub(crate) const MAX_STEP: usize = 64;
 /// Averaged samples that are correlated at most: the stretch in which the target moves most.
 const MAX_STRETCH: usize = 8192;
 /// Places at which a stretch may start.
@@ -65,6 +66,8 @@ pub(crate) struct Peaks {
     pub(crate) lowest: f64,
     /// Samples from one lag looked at to the next.
     pub(crate) step: usize,
+    /// The largest lag looked at, in samples.
+    pub(crate) reach: usize,
     /// Cycles that the target moves through in the window.
     pub(crate) cycles: f64,
 }
@@ -96,9 +99,9 @@ pub(crate) struct SearchState {
 }
 
 impl Search {
-    /// For windows of `n_samples`, lags of up to `max_delay` samples either way (a quarter of the window at most).
+    /// For windows of `n_samples`, lags of up to `max_delay` samples either way (the window's length at most).
     pub(crate) fn new(n_samples: usize, max_delay: f64) -> Self {
-        let wanted = (max_delay.ceil() as usize).clamp(1, (n_samples / 4).max(1));
+        let wanted = (max_delay.ceil() as usize).clamp(1, n_samples.max(1));
         let most = MAX_STEP.min(wanted / 4).min(n_samples / 64).max(1);
         let max_step = 1 << most.ilog2();
         Self { n_samples, max_step, reach: wanted.next_multiple_of(max_step), arch: Arch::new() }
@@ -118,19 +121,22 @@ impl Search {
         }
     }
 
-    /// The peaks for the window that starts at sample `start` of the record; `None` where too few samples can be compared
-    /// or one of the signals does not move.
-    pub(crate) fn peaks(&self, state: &mut SearchState, view: &View<'_>, start: usize) -> Option<Peaks> {
-        let from = start.max(view.origin + self.reach);
-        let to = (start + self.n_samples).min(view.end().saturating_sub(self.reach));
-        if to < from + 2 * self.max_step.max(4) {
-            return None;
+    /// The peaks for the window that starts at sample `start` of the record. Where the record does not go on beyond the
+    /// window, lags of up to a quarter of it are looked at, so that half of it is left to compare.
+    pub(crate) fn peaks(&self, state: &mut SearchState, view: &View<'_>, start: usize) -> Result<Peaks, Reason> {
+        let outside = (start - view.origin).min(view.end() - (start + self.n_samples));
+        let reach = self.reach.min(outside.max(self.n_samples / 4)) / self.max_step * self.max_step;
+        let from = start.max(view.origin + reach);
+        let to = (start + self.n_samples).min(view.end().saturating_sub(reach));
+        if reach == 0 || to < from + 2 * self.max_step.max(4) {
+            return Err(Reason::TooShort { n_samples: to.saturating_sub(from) });
         }
+        let full_reach = reach;
         let SearchState { target, measured, correlations } = state;
-        let asked = &view.target[from - self.reach - view.origin..to + self.reach - view.origin];
+        let asked = &view.target[from - full_reach - view.origin..to + full_reach - view.origin];
         let answered = &view.measured[from - view.origin..to - view.origin];
         let n = answered.len();
-        let own = &asked[self.reach..self.reach + n];
+        let own = &asked[full_reach..full_reach + n];
         let line = Detrend::Linear.line(own);
         // Lines are orthogonal to what is left of them.
         let left = |energy: f64, n: usize, step: usize| energy - line.map_or(0.0, |line| line.energy(n, step as f64));
@@ -144,10 +150,10 @@ impl Search {
             step /= 2;
         }
         let n = n / step;
-        let n_target = n + 2 * (self.reach / step);
+        let n_target = n + 2 * (full_reach / step);
         sums::block_means(asked, step, &mut target[..n_target]);
         sums::block_means(answered, step, &mut measured[..n]);
-        let reach = self.reach / step;
+        let reach = full_reach / step;
         let cycles = cycles(&target[reach..reach + n]);
         take_line(&mut target[..n_target], reach..reach + n);
         take_line(&mut measured[..n], 0..n);
@@ -166,7 +172,7 @@ impl Search {
             let own = squares - sum * sum / n as f64;
             let comparable = own > round_off && spread > 0.0;
             moved |= comparable;
-            correlations[k] = if comparable { correlations[k] / (own * spread).sqrt() } else { 0.0 };
+            correlations[k] = if comparable { correlations[k] / (own.sqrt() * spread.sqrt()) } else { 0.0 };
             if k + 1 < correlations.len() {
                 let (leaves, enters) = (target[k], target[k + n]);
                 sum += enters - leaves;
@@ -174,7 +180,7 @@ impl Search {
             }
         }
         if !moved {
-            return None;
+            return Err(Reason::Still);
         }
         // Entry k compares with the target k - reach steps later: the lag falls with k.
         let lag = |k: f64| (reach as f64 - k) * step as f64;
@@ -183,6 +189,7 @@ impl Search {
             n_peaks: 0,
             lowest: correlations.iter().copied().fold(f64::INFINITY, f64::min),
             step,
+            reach: full_reach,
             cycles,
         };
         for k in 0..correlations.len() {
@@ -200,7 +207,10 @@ impl Search {
         }
         let best = found.peaks[0].correlation;
         found.n_peaks = found.peaks[..found.n_peaks].iter().filter(|p| p.correlation >= best - PEAK_MARGIN).count();
-        (found.n_peaks > 0).then_some(found)
+        if found.n_peaks == 0 {
+            return Err(Reason::Still);
+        }
+        Ok(found)
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::pair::{MIN_SAMPLES, Pair};
 use crate::reason::Reason;
-use crate::tracking::{Evaluator, EvaluatorConfig, Tracking};
+use crate::tracking::{Estimator, Evaluator, EvaluatorConfig, Tracking};
 
 /// The user's numbers for a moving evaluation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,7 +64,11 @@ pub struct MovingTracking {
 /// [`Error::Setting`] for a window longer than the record or a hop or ratio out of range; [`Error::NotFinite`], [`Error::Range`]; whatever
 /// [`Evaluator::new`] refuses for one window.
 pub fn evaluate_moving(pair: &Pair<'_>, config: &MovingConfig) -> Result<MovingTracking> {
-    pair.check_samples()?;
+    if config.evaluator.estimator == Estimator::Fei {
+        pair.check_samples()?
+    } else {
+        pair.check_fourth_powers()?
+    };
     let (n, rate_hz) = (pair.n_samples(), pair.rate_hz());
     let window = samples_of("window_s", config.window_s, rate_hz, MIN_SAMPLES, n)?;
     let hop = samples_of("hop_s", config.hop_s, rate_hz, 1, usize::MAX)?;

@@ -72,13 +72,22 @@ impl<'a> Pair<'a> {
     /// # Errors
     /// [`Error::NotFinite`], [`Error::Range`].
     pub fn check_samples(&self) -> Result<()> {
+        self.check_powers(2, SQUARABLE)
+    }
+
+    /// The same for products of four samples.
+    pub(crate) fn check_fourth_powers(&self) -> Result<()> {
+        self.check_powers(4, 1e-60..=1e60)
+    }
+
+    fn check_powers(&self, weight_power: u32, magnitudes: std::ops::RangeInclusive<f64>) -> Result<()> {
         for (signal, samples) in [(Signal::Target, self.target), (Signal::Measured, self.measured)] {
             let (peak, finite) = sums::peak(samples);
             if !finite {
                 check_finite(samples, signal)?;
             }
-            if peak != 0.0 && !SQUARABLE.contains(&peak) {
-                return Err(Error::Range { signal, peak, weight_power: 2 });
+            if peak != 0.0 && !magnitudes.contains(&peak) {
+                return Err(Error::Range { signal, peak, weight_power });
             }
         }
         Ok(())

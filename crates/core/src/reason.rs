@@ -97,7 +97,11 @@ impl fmt::Display for Reason {
                 1e3 * other_s
             ),
             Reason::BeyondMaxDelay { max_delay_s } => {
-                write!(f, "not determined: the best delay lies beyond max_delay_s = {max_delay_s} s; raise it")
+                write!(
+                    f,
+                    "not determined: the best delay lies beyond {max_delay_s} s, the largest looked for: max_delay_s, or a quarter of \
+                 the samples; raise it or take a longer window"
+                )
             }
             Reason::OppositeSign => {
                 write!(f, "not determined: measured moves against target; does one of them have the opposite sign?")

@@ -81,7 +81,8 @@ pub struct EvaluatorConfig {
     pub detrend: Detrend,
     /// Lowest and highest frequency kept, both included, in hertz.
     pub band_hz: Option<(f64, f64)>,
-    /// Largest delay or lead looked for by the estimators that shift the target, in seconds; a quarter of the record at most.
+    /// Largest delay or lead looked for by the estimators that shift the target, in seconds; where the record does not go on beyond
+    /// what is judged, a quarter of that at most.
     pub max_delay_s: f64,
     /// What least squares takes the noise on measured for.
     pub noise: Noise,
@@ -347,7 +348,7 @@ impl Evaluator {
     pub fn evaluate(&self, state: &mut EvaluatorState, pair: &Pair<'_>) -> Result<Tracking> {
         if let (Some(alignment), Some(state)) = (&self.alignment, &mut state.alignment) {
             self.check(pair)?;
-            pair.check_samples()?;
+            pair.check_fourth_powers()?;
             return Ok(alignment.estimate(state, &View::whole(pair), 0, None));
         }
         self.published(state, pair)

@@ -24,7 +24,7 @@ use crate::alignment::grid::Grid;
 use crate::alignment::products::{Cross, Multiply, Products};
 use crate::alignment::weighting::{Energies, Weighting};
 use crate::error::Result;
-use crate::lag::{Peak, Peaks, Search, SearchState, View};
+use crate::lag::{MAX_STEP, Peak, Peaks, Search, SearchState, View};
 use crate::lagrange::{AFTER, BEFORE, NODES, Taps};
 use crate::noise::{
     Autoregression, Influence, MAX_ORDER, NoisyTarget, Precision, Sampling, Spread, SpreadState, cell_width,
@@ -141,7 +141,7 @@ impl Alignment {
         let undecimated = data_decimation == 1 && frequency_decimation == 1 && band_hz.is_none();
         let exact_target = config.noise_ratio == 0.0;
         let window = config.window.coefficients(n_samples);
-        let low = 1usize << (rate_hz / (2.0 * LOW_HZ)).max(1.0).log2() as u32;
+        let low = 1usize << (rate_hz / (2.0 * LOW_HZ)).clamp(1.0, 1e6).log2() as u32;
         let low = (undecimated && exact_target && low >= SHORTENING && n_samples >= 2 * low * low)
             .then(|| Grid::low(plan, low));
         Ok(Self {
@@ -205,7 +205,7 @@ impl Alignment {
         start: usize,
         expected: Option<f64>,
     ) -> std::result::Result<Tracking, Reason> {
-        let Some(peaks) = self.search.peaks(&mut state.search, view, start) else { return Err(Reason::Still) };
+        let peaks = self.search.peaks(&mut state.search, view, start)?;
         if peaks.cycles < MIN_CYCLES {
             return Err(Reason::FewCycles { found: peaks.cycles });
         }
@@ -213,23 +213,35 @@ impl Alignment {
         if -peaks.lowest > highest + 0.1 {
             return Err(Reason::OppositeSign);
         }
+        let limit = self.max_delay.min(peaks.reach as f64);
         if self.noise_ratio > 0.0 {
             self.weigh_bins(state, view, start, peaks.peaks()[0].lag);
-            let (first, _) = self.best(state, view, start, peaks.peaks(), peaks.step, expected, true)?;
+            let (first, _) = self.best(state, view, start, peaks.peaks(), peaks.step, limit, expected, true)?;
             // Once more at a delay that leaves nothing but noise.
             self.weigh_bins(state, view, start, first.tau);
             let around = Peak { lag: first.tau, correlation: 1.0 };
-            let (best, support) = self.best(state, view, start, &[around], peaks.step, None, true)?;
+            let (best, support) = self.best(state, view, start, &[around], peaks.step, limit, None, true)?;
             return self.complete(state, view, start, &peaks, best, support);
         }
-        let (best, support) = self.best(state, view, start, peaks.peaks(), peaks.step, expected, false)?;
+        let mut found = self.best(state, view, start, peaks.peaks(), peaks.step, limit, expected, false);
+        if found.is_err() && !self.in_time {
+            // An offset that no bin holds may be all that the samples have in common.
+            found = self.best(state, view, start, peaks.peaks(), peaks.step, limit, expected, true);
+        }
+        let at_the_end = peaks.peaks()[0].lag.abs() + peaks.step as f64 > limit;
+        let (best, support) = match found {
+            Err(Reason::NoConvergence) if at_the_end => {
+                return Err(Reason::BeyondMaxDelay { max_delay_s: limit / self.rate_hz });
+            }
+            found => found?,
+        };
         if self.noise == Noise::Coloured {
             // Whitened by what the residual says of the noise, measured and target obey the same model.
             let goodness = Some(self.leave_residual(state, &best, start, &support));
             let noise = self.autoregression(state, start, &support);
             let p = noise.order;
             if p > 0 {
-                let margin = self.search.reach() + 2 * NODES;
+                let margin = self.margin();
                 let from = start.saturating_sub(margin + p).max(view.origin);
                 let to = (start + self.n_samples + margin).min(view.end());
                 let part = from - view.origin..to - view.origin;
@@ -239,11 +251,12 @@ impl Alignment {
                 noise.whiten(&view.measured[part], &mut second[..n]);
                 let view = View { target: &first[..n], measured: &second[..n], origin: from + p };
                 let around = Peak { lag: best.tau, correlation: 1.0 };
-                let found =
-                    self.best(state, &view, start, &[around], peaks.step, None, false).and_then(|(best, support)| {
+                let found = self.best(state, &view, start, &[around], peaks.step, limit, None, false).and_then(
+                    |(best, support)| {
                         // Whitening leaves less of the motion than of the noise; that says nothing of the tracking.
                         self.complete(state, &view, start, &peaks, Fit { goodness, ..best }, support)
-                    });
+                    },
+                );
                 state.whitened = [first, second];
                 return found;
             }
@@ -264,7 +277,7 @@ impl Alignment {
     ) -> std::result::Result<Tracking, Reason> {
         if self.estimator == Estimator::Aligned {
             let tracking = self.align(state, view, start, support, best)?;
-            self.check_delay(tracking.delay_s * self.rate_hz)?;
+            self.check_delay(tracking.delay_s * self.rate_hz, peaks)?;
             return Ok(tracking);
         }
         if !self.in_time && self.noise_ratio == 0.0 {
@@ -274,13 +287,14 @@ impl Alignment {
             let goodness = best.goodness;
             best = Fit { goodness, ..self.refine(state, view, start, &support, best.tau, room, true)? };
         }
-        self.check_delay(best.tau)?;
+        self.check_delay(best.tau, peaks)?;
         Ok(self.finish(state, start, &support, &best, None))
     }
 
-    fn check_delay(&self, tau: f64) -> std::result::Result<(), Reason> {
-        if tau.abs() > self.max_delay * (1.0 + 1e-9) {
-            return Err(Reason::BeyondMaxDelay { max_delay_s: self.max_delay / self.rate_hz });
+    fn check_delay(&self, tau: f64, peaks: &Peaks) -> std::result::Result<(), Reason> {
+        let limit = self.max_delay.min(peaks.reach as f64);
+        if tau.abs() > limit * (1.0 + 1e-9) {
+            return Err(Reason::BeyondMaxDelay { max_delay_s: limit / self.rate_hz });
         }
         Ok(())
     }
@@ -320,7 +334,12 @@ impl Alignment {
 
     /// Longest stretch of record that a window needs.
     fn longest_view(&self) -> usize {
-        self.n_samples + 2 * (self.search.reach() + 2 * NODES) + MAX_ORDER
+        self.n_samples + 2 * self.margin() + MAX_ORDER
+    }
+
+    /// Samples on either side of a window that any look at the target may need.
+    fn margin(&self) -> usize {
+        2 * self.search.reach() + MAX_STEP + 2 * NODES
     }
 
     /// Refines the peaks and takes the best, whose signals stand in the state afterwards.
@@ -331,6 +350,7 @@ impl Alignment {
         start: usize,
         peaks: &[Peak],
         step: usize,
+        limit: f64,
         expected: Option<f64>,
         in_bins: bool,
     ) -> std::result::Result<(Fit, Range<usize>), Reason> {
@@ -352,7 +372,8 @@ impl Alignment {
         for (slot, peak) in fits.iter_mut().zip(peaks) {
             // Twice, so that no step is left that the residual would show.
             let found = self.refine(state, view, start, &support, peak.lag, room, in_bins);
-            *slot = found.and_then(|f| self.refine(state, view, start, &support, f.tau, 1.0, in_bins)).ok();
+            let found = found.and_then(|f| self.refine(state, view, start, &support, f.tau, 1.0, in_bins));
+            *slot = found.ok().filter(|f| f.tau.abs() <= limit * (1.0 + 1e-9));
         }
         let Some(best) = fits.iter().flatten().copied().min_by(|a, b| a.residual.total_cmp(&b.residual)) else {
             return Err(Reason::NoConvergence);
@@ -449,6 +470,10 @@ impl Alignment {
                 }
             }
             let step = score.value / slope;
+            if step.abs() >= last_step && above - below < LAST_STEP && (now - low).min(high - now) < 2.0 * LAST_STEP {
+                // Driven against the end of where it may look: what it seeks lies beyond.
+                return Err(Reason::NoConvergence);
+            }
             if step.abs() < last_step || above - below < LAST_STEP {
                 let step = step.clamp(-last_step, last_step);
                 let Products { yy, yv, vv, oy, ov, .. } = products;
@@ -713,8 +738,9 @@ impl Alignment {
         fit: &Fit,
         averaged: Option<Averaged>,
     ) -> Tracking {
+        let of_bins = (!self.in_time).then(|| self.goodness_in_bins(state, fit.gain));
         let left = self.leave_residual(state, fit, start, support);
-        let goodness = fit.goodness.unwrap_or(left);
+        let goodness = fit.goodness.or(of_bins).unwrap_or(left);
         if goodness.is_nan() || goodness < MIN_GOODNESS {
             return Tracking::undetermined(Reason::LowCoherence { goodness });
         }
@@ -738,6 +764,16 @@ impl Alignment {
             None => tracking.without_interval(Reason::FewBins),
             Some(precision) => self.with_precision(tracking, &precision, 1.0 - left <= EXACT),
         }
+    }
+
+    /// The share of measured's energy at the kept bins that the fit explains; its transform still stands in the state.
+    fn goodness_in_bins(&self, state: &AlignmentState, gain: f64) -> f64 {
+        let [y, _, o] = &state.bins;
+        let correction = self.kept.correction.as_deref();
+        let mut cross = Cross { correction, first: self.kept.spectrum.first(), ..Cross::default() };
+        self.kept.spectrum.visit_pair([y, o], &mut cross);
+        let (yy, oy, oo) = cross.totals();
+        if oo > 0.0 { 1.0 - (oo - 2.0 * gain * oy + gain * gain * yy) / oo } else { f64::NAN }
     }
 
     /// Eq 7 of the shifted target that stands in the state.
@@ -776,9 +812,13 @@ impl Alignment {
         let spectrum = &grid.spectrum;
         let [y, v, e] = bins.each_mut().map(|b| &mut b[..spectrum.packed_len()]);
         grid.transform(scratch, measured, averages, e);
-        // The estimate is a sum over w (w y), so the noise is seen through the window twice.
+        // The estimate is a sum over w (w y), so the noise is seen through the window twice; where the record is folded upon
+        // itself, what is summed is w y over noise of the mean of w^2.
+        let folded_up = grid.folded_len() < within.len() as f64;
         for (signal, bins) in [(&mut *shifted, &mut *y), (&mut *slope, &mut *v)] {
-            self.taper(&mut signal[within.clone()], &within);
+            if !folded_up {
+                self.taper(&mut signal[within.clone()], &within);
+            }
             grid.transform(scratch, signal, averages, bins);
         }
         let (window_power, fourths) = self.window_moments(&within);
@@ -786,7 +826,7 @@ impl Alignment {
         let sampling = Sampling {
             window_power,
             bins_per_piece: (folded * fourths / (window_power * window_power)).max(1.0),
-            scale: 0.5 * folded.max(within.len() as f64),
+            scale: 0.5 * if folded_up { window_power } else { folded },
         };
         // Sums over samples are 2 / n times those over bins.
         let to_bins = if self.in_time { 0.5 * folded } else { 1.0 };
@@ -833,6 +873,9 @@ impl Alignment {
         }
         let Precision { gain_std, gain_reach, delay_std, delay_reach, .. } = *precision;
         let (delay_std, delay_reach) = (delay_std / self.rate_hz, delay_reach / self.rate_hz);
+        if ![gain_std, gain_reach, delay_std, delay_reach].iter().all(|v| v.is_finite()) {
+            return tracking.without_interval(Reason::FewBins);
+        }
         // Wider than half a turn says nothing of the delay.
         if delay_reach * tracking.equivalent_frequency_hz >= 0.25 {
             return Tracking::undetermined(Reason::Uncertain { reach_s: delay_reach });
@@ -847,7 +890,7 @@ impl Alignment {
     /// The delay of the highest correlation peak of the whole record, in samples, where no other comes near it.
     pub(crate) fn expected(pair: &crate::Pair<'_>, max_delay_s: f64) -> Option<f64> {
         let search = Search::new(pair.n_samples(), max_delay_s * pair.rate_hz());
-        let peaks = search.peaks(&mut search.state(), &View::whole(pair), 0)?;
+        let peaks = search.peaks(&mut search.state(), &View::whole(pair), 0).ok()?;
         match peaks.peaks() {
             [only] => Some(only.lag),
             _ => None,
