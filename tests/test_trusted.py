@@ -482,4 +482,4 @@ def test_an_estimate_that_is_not_determined_is_not_said_to_agree_and_keeps_no_li
     assert found.exceeded == ()
     assert found.warnings[0] == "no limit was checked: gain and delay are not determined"
     assert "agrees" not in found.argument
-    assert "beyond" in str(found.tracking.reason)
+    assert "beyond max_delay_s" in str(found.tracking.reason)

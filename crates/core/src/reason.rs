@@ -99,8 +99,8 @@ impl fmt::Display for Reason {
             Reason::BeyondMaxDelay { max_delay_s } => {
                 write!(
                     f,
-                    "not determined: the best delay lies beyond {max_delay_s} s, the largest looked for: max_delay_s, or a quarter of \
-                 the samples; raise it or take a longer window"
+                    "not determined: the best delay lies beyond max_delay_s, or beyond a quarter of the samples where the record ends \
+                 with them ({max_delay_s} s); raise it or take a longer window"
                 )
             }
             Reason::OppositeSign => {
