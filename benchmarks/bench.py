@@ -292,7 +292,7 @@ def main() -> int:
         " public function against the compiled plan.",
         "",
         "`aligned` transforms target, its slope, measured and residual and cannot be had for 2.5 plain evaluations,"
-        " which are two transforms. In 4 s windows with a Hann window `least_squares` took 2.45 to 2.55 times the plain"
+        " which are two transforms. In 4 s windows with a Hann window `least_squares` took 2.4 to 2.65 times the plain"
         " time from run to run.",
         "",
         "Between runs the cells at P = 64, Q >= 16 move from 0.9 to 1.14 times their neighbours, so that one of them"
