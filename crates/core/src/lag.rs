@@ -131,12 +131,11 @@ impl Search {
         if reach == 0 || to < from + 2 * self.max_step.max(4) {
             return Err(Reason::TooShort { n_samples: to.saturating_sub(from) });
         }
-        let full_reach = reach;
         let SearchState { target, measured, correlations } = state;
-        let asked = &view.target[from - full_reach - view.origin..to + full_reach - view.origin];
+        let asked = &view.target[from - reach - view.origin..to + reach - view.origin];
         let answered = &view.measured[from - view.origin..to - view.origin];
         let n = answered.len();
-        let own = &asked[full_reach..full_reach + n];
+        let own = &asked[reach..reach + n];
         let line = Detrend::Linear.line(own);
         // Lines are orthogonal to what is left of them.
         let left = |energy: f64, n: usize, step: usize| energy - line.map_or(0.0, |line| line.energy(n, step as f64));
@@ -150,20 +149,20 @@ impl Search {
             step /= 2;
         }
         let n = n / step;
-        let n_target = n + 2 * (full_reach / step);
+        let n_target = n + 2 * (reach / step);
         sums::block_means(asked, step, &mut target[..n_target]);
         sums::block_means(answered, step, &mut measured[..n]);
-        let reach = full_reach / step;
-        let cycles = cycles(&target[reach..reach + n]);
-        take_line(&mut target[..n_target], reach..reach + n);
+        let lags = reach / step;
+        let cycles = cycles(&target[lags..lags + n]);
+        take_line(&mut target[..n_target], lags..lags + n);
         take_line(&mut measured[..n], 0..n);
-        let at = liveliest(&target[reach..reach + n]);
+        let at = liveliest(&target[lags..lags + n]);
         let n = n.min(MAX_STRETCH);
-        let (target, measured) = (&target[at..at + n + 2 * reach], &mut measured[at..at + n]);
+        let (target, measured) = (&target[at..at + n + 2 * lags], &mut measured[at..at + n]);
         let mean = sums::sum(measured) / n as f64;
         measured.iter_mut().for_each(|v| *v -= mean);
         let spread = sums::energy(measured);
-        let correlations = &mut correlations[..2 * reach + 1];
+        let correlations = &mut correlations[..2 * lags + 1];
         self.arch.dispatch(Correlate { target, measured, out: correlations });
         let round_off = 1e-13 * sums::energy(target);
         let (mut sum, mut squares): (f64, f64) = target[..n].iter().fold((0.0, 0.0), |(s, q), v| (s + v, q + v * v));
@@ -182,14 +181,14 @@ impl Search {
         if !moved {
             return Err(Reason::Still);
         }
-        // Entry k compares with the target k - reach steps later: the lag falls with k.
-        let lag = |k: f64| (reach as f64 - k) * step as f64;
+        // Entry k compares with the target k - lags steps later: the lag falls with k.
+        let lag = |k: f64| (lags as f64 - k) * step as f64;
         let mut found = Peaks {
             peaks: [Peak::default(); MAX_PEAKS],
             n_peaks: 0,
             lowest: correlations.iter().copied().fold(f64::INFINITY, f64::min),
             step,
-            reach: full_reach,
+            reach,
             cycles,
         };
         for k in 0..correlations.len() {

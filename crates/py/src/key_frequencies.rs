@@ -1,19 +1,18 @@
 //! `KeyFrequencies`: the choice, shared by threads; each call takes a state from the pool.
 
-use std::sync::{Mutex, PoisonError};
-
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use rthstrack::{KeyFrequenciesConfig, KeyFrequenciesState, Pair};
 
 use crate::error::to_py;
+use crate::pool::Pool;
 use crate::tracking::{Numbers, Settings, numbers};
 
 /// The bins of one target, and the plan to evaluate pairs at them.
 #[pyclass(frozen, module = "rthstrack._core")]
 pub(crate) struct KeyFrequencies {
     plan: rthstrack::KeyFrequencies,
-    states: Mutex<Vec<KeyFrequenciesState>>,
+    states: Pool<KeyFrequenciesState>,
 }
 
 #[pymethods]
@@ -29,7 +28,7 @@ impl KeyFrequencies {
         let config = KeyFrequenciesConfig { share, evaluator: settings.config(py)? };
         let target = target.as_slice()?;
         let plan = py.detach(|| rthstrack::KeyFrequencies::new(target, rate_hz, config)).map_err(|e| to_py(py, &e))?;
-        Ok(Self { plan, states: Mutex::default() })
+        Ok(Self { plan, states: Pool::new() })
     }
 
     #[getter]
@@ -59,14 +58,9 @@ impl KeyFrequencies {
         measured: PyReadonlyArray1<'_, f64>,
     ) -> PyResult<Numbers> {
         let (target, measured) = (target.as_slice()?, measured.as_slice()?);
-        // A state holds nothing between calls, so one left by a panic is as good as new.
-        let states = || self.states.lock().unwrap_or_else(PoisonError::into_inner);
         let found = py.detach(|| {
-            let mut state = states().pop().unwrap_or_else(|| self.plan.state());
-            let found =
-                Pair::new(target, measured, self.plan.rate_hz()).and_then(|pair| self.plan.evaluate(&mut state, &pair));
-            states().push(state);
-            found
+            let pair = Pair::new(target, measured, self.plan.rate_hz())?;
+            self.states.with(|| self.plan.state(), |state| self.plan.evaluate(state, &pair))
         });
         found.map(|t| numbers(&t)).map_err(|e| to_py(py, &e))
     }

@@ -8,6 +8,7 @@ mod factors;
 mod indices;
 mod key_frequencies;
 mod moving;
+mod pool;
 mod response;
 mod signal;
 mod text;

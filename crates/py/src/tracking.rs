@@ -1,7 +1,5 @@
 //! `Evaluator`: the plan, shared by threads; each call takes a state from the pool.
 
-use std::sync::Mutex;
-
 use num_complex::Complex;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
@@ -10,6 +8,7 @@ use rthstrack::{
 };
 
 use crate::error::{choice, of_actuator, to_py};
+use crate::pool::Pool;
 use crate::signal::Columns;
 
 /// amplitude, phase_rad, delay_s, equivalent_frequency_hz, fei
@@ -84,7 +83,7 @@ impl Settings {
 #[pyclass(frozen, module = "rthstrack._core")]
 pub(crate) struct Evaluator {
     plan: rthstrack::Evaluator,
-    states: Mutex<Vec<EvaluatorState>>,
+    states: Pool<EvaluatorState>,
 }
 
 #[pymethods]
@@ -92,7 +91,7 @@ impl Evaluator {
     #[new]
     fn new(py: Python<'_>, n_samples: usize, rate_hz: f64, settings: Settings) -> PyResult<Self> {
         let plan = rthstrack::Evaluator::new(n_samples, rate_hz, settings.config(py)?).map_err(|e| to_py(py, &e))?;
-        Ok(Self { plan, states: Mutex::default() })
+        Ok(Self { plan, states: Pool::new() })
     }
 
     #[getter]
@@ -163,14 +162,6 @@ impl Evaluator {
 
     /// Calls with the plan and a state from the pool.
     pub(crate) fn with_state<T>(&self, call: impl FnOnce(&rthstrack::Evaluator, &mut EvaluatorState) -> T) -> T {
-        let mut state = self.lock().pop().unwrap_or_else(|| self.plan.state());
-        let result = call(&self.plan, &mut state);
-        self.lock().push(state);
-        result
-    }
-
-    /// A state holds nothing between calls, so one left by a panic is as good as new.
-    fn lock(&self) -> std::sync::MutexGuard<'_, Vec<EvaluatorState>> {
-        self.states.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+        self.states.with(|| self.plan.state(), |state| call(&self.plan, state))
     }
 }

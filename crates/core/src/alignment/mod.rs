@@ -213,7 +213,7 @@ impl Alignment {
         if -peaks.lowest > highest + 0.1 {
             return Err(Reason::OppositeSign);
         }
-        let limit = self.max_delay.min(peaks.reach as f64);
+        let limit = self.limit(&peaks);
         if self.noise_ratio > 0.0 {
             self.weigh_bins(state, view, start, peaks.peaks()[0].lag);
             let (first, _) = self.best(state, view, start, peaks.peaks(), peaks.step, limit, expected, true)?;
@@ -291,8 +291,13 @@ impl Alignment {
         Ok(self.finish(state, start, &support, &best, None))
     }
 
+    /// The largest delay taken, in samples.
+    fn limit(&self, peaks: &Peaks) -> f64 {
+        self.max_delay.min(peaks.reach as f64)
+    }
+
     fn check_delay(&self, tau: f64, peaks: &Peaks) -> std::result::Result<(), Reason> {
-        let limit = self.max_delay.min(peaks.reach as f64);
+        let limit = self.limit(peaks);
         if tau.abs() > limit * (1.0 + 1e-9) {
             return Err(Reason::BeyondMaxDelay { max_delay_s: limit / self.rate_hz });
         }
