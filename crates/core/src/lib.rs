@@ -13,11 +13,12 @@
 //! 6. `alignment`: the estimators that shift the target before it is windowed; `lag` finds where to start, `lagrange` reads
 //!    between samples, `noise` gives the intervals, [`reason`] says why there is none.
 //! 7. [`moving`]: the same over moving windows.
-//! 8. [`factors`]: the largest P and Q that a tolerance allows.
-//! 9. [`key_frequencies`]: the few bins that hold most of the weight, evaluated alone.
-//! 10. [`response`]: gain, phase, delay and coherence over frequency, with intervals.
-//! 11. [`slopes`]: the same as two straight lines.
-//! 12. [`mod@indices`]: the time-domain indices in use beside them.
+//! 8. [`monitor`]: the same while the test runs, sample by sample; [`causal`] is its P.
+//! 9. [`factors`]: the largest P and Q that a tolerance allows.
+//! 10. [`key_frequencies`]: the few bins that hold most of the weight, evaluated alone.
+//! 11. [`response`]: gain, phase, delay and coherence over frequency, with intervals.
+//! 12. [`slopes`]: the same as two straight lines.
+//! 13. [`mod@indices`]: the time-domain indices in use beside them.
 //!
 //! [`dynamics`] makes such signals: virtual tests of structures with actuators that lag. It and the evaluation do not know
 //! each other.
@@ -27,6 +28,7 @@
 #![forbid(unsafe_code)]
 
 mod alignment;
+pub mod causal;
 pub mod decimate;
 pub mod dynamics;
 pub mod error;
@@ -35,6 +37,7 @@ pub mod indices;
 pub mod key_frequencies;
 mod lag;
 mod lagrange;
+pub mod monitor;
 pub mod moving;
 mod noise;
 pub mod pair;
@@ -47,11 +50,13 @@ mod sums;
 pub mod tracking;
 pub mod window;
 
+pub use causal::{CausalDecimator, CausalState};
 pub use decimate::Decimator;
 pub use error::{Error, Result, Signal};
 pub use factors::{DelayMeasure, FactorChange, Factors, FactorsConfig, PriorBounds, choose_factors, prior_bounds};
 pub use indices::{IndexHistories, Indices, index_histories, indices};
 pub use key_frequencies::{KeyFrequencies, KeyFrequenciesConfig, KeyFrequenciesState};
+pub use monitor::{Monitor, MonitorConfig, MonitorState, Processed, Reading};
 pub use moving::{MovingConfig, MovingTracking, evaluate_moving};
 pub use pair::Pair;
 pub use reason::Reason;

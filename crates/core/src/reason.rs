@@ -8,6 +8,10 @@ use std::fmt;
 pub enum Reason {
     /// The target moves too little in the window, or one signal not at all.
     Still,
+    /// The window holds samples that are NaN or infinite.
+    NotFinite,
+    /// The window holds samples so large or so small that their powers leave the range of double precision.
+    Range,
     /// Too few samples are left for which the shifted target is known.
     TooShort {
         /// How many are left.
@@ -66,6 +70,11 @@ impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Reason::Still => write!(f, "not determined: too little motion to judge by"),
+            Reason::NotFinite => write!(f, "not determined: the window holds samples that are NaN or infinite"),
+            Reason::Range => write!(
+                f,
+                "not determined: magnitudes leave the range of double precision; scale the signals to a usual unit"
+            ),
             Reason::TooShort { n_samples } => write!(
                 f,
                 "not determined: only {n_samples} samples are left for which the shifted target is known; \

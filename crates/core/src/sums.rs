@@ -43,6 +43,11 @@ pub(crate) fn energy(samples: &[f64]) -> f64 {
     Arch::new().dispatch(Fold { samples, f: |_, x| x * x })
 }
 
+/// sum (x - level)^2
+pub(crate) fn spread(samples: &[f64], level: f64) -> f64 {
+    Arch::new().dispatch(Fold { samples, f: |_, x| (x - level) * (x - level) })
+}
+
 /// sum x^4
 pub(crate) fn fourths(samples: &[f64]) -> f64 {
     Arch::new().dispatch(Fold { samples, f: |_, x| x * x * x * x })

@@ -354,6 +354,27 @@ impl Evaluator {
         self.published(state, pair)
     }
 
+    /// Samples before a window that [`Evaluator::evaluate_last`] may look at.
+    pub(crate) fn samples_before(&self) -> usize {
+        self.alignment.as_ref().map_or(0, Alignment::margin)
+    }
+
+    /// Evaluates the last `n_samples` of a pair; the estimators that shift the target also see what comes before them. Of delays
+    /// that fit equally well the one nearest to `expected`, in samples, is taken.
+    pub(crate) fn evaluate_last(
+        &self,
+        state: &mut EvaluatorState,
+        pair: &Pair<'_>,
+        expected: Option<f64>,
+    ) -> Result<Tracking> {
+        let start = pair.n_samples() - self.n_samples;
+        if let (Some(alignment), Some(state)) = (&self.alignment, &mut state.alignment) {
+            pair.check_fourth_powers()?;
+            return Ok(alignment.estimate(state, &View::whole(pair), start, expected));
+        }
+        self.published(state, &Pair::new(&pair.target()[start..], &pair.measured()[start..], pair.rate_hz())?)
+    }
+
     /// Eqs 1 to 12, whatever the estimator.
     fn published(&self, state: &mut EvaluatorState, pair: &Pair<'_>) -> Result<Tracking> {
         self.transform(state, pair)?;

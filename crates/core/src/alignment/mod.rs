@@ -343,7 +343,7 @@ impl Alignment {
     }
 
     /// Samples on either side of a window that any look at the target may need.
-    fn margin(&self) -> usize {
+    pub(crate) fn margin(&self) -> usize {
         2 * self.search.reach() + MAX_STEP + 2 * NODES
     }
 

@@ -1,0 +1,404 @@
+//! The evaluation while the test runs: one sample of every actuator in, now and then gain and delay out.
+//!
+//! ```text
+//! incoming samples -> [P: CausalDecimator] -> the latest window -> Evaluator -> Reading
+//! ```
+//!
+//! A reading is the batch evaluation of the samples that stand in the window, computed anew each time: nothing is added to or taken
+//! from running sums, so nothing drifts, and a sample that is no number is forgotten when it leaves the window. The estimators
+//! that shift the target also see what came just before the window; after it there is nothing yet, so a lead costs them the
+//! window's last samples.
+
+use crate::causal::{CausalDecimator, CausalState, Ring};
+use crate::decimate::Decimator;
+use crate::error::{Error, Result};
+use crate::pair::{MIN_SAMPLES, Pair, check_rate};
+use crate::reason::Reason;
+use crate::sums;
+use crate::tracking::{Estimator, Evaluator, EvaluatorConfig, EvaluatorState, Tracking};
+use crate::window::{Detrend, Window};
+
+/// Samples after decimation that the windows of all actuators may hold.
+const MAX_SAMPLES: f64 = 4_194_304.0;
+
+/// The user's numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MonitorConfig {
+    /// Incoming samples a second.
+    pub rate_hz: f64,
+    /// Length of the window, in seconds.
+    pub window_s: f64,
+    /// Readings a second.
+    pub update_hz: f64,
+    /// Lowest and highest frequency kept, both included, in hertz. Where none is given and P is above 1, `fei` keeps up to rate / (4 P), and the
+    /// other estimators what the decimator passes.
+    pub band_hz: Option<(f64, f64)>,
+    /// Window over the samples.
+    pub window: Window,
+    /// What is subtracted before the window.
+    pub detrend: Detrend,
+    /// How gain and delay are estimated.
+    pub estimator: Estimator,
+    /// P, a power of two: samples are decimated as they come ([`CausalDecimator`]), and evaluated at rate / P.
+    pub data_decimation: usize,
+    /// Q, a power of two: keeps every Q-th bin.
+    pub frequency_decimation: usize,
+    /// Largest delay or lead looked for by the estimators that shift the target, in seconds.
+    pub max_delay_s: f64,
+    /// Of delays that fit equally well (the target is one tone), the one nearest to this is taken, in seconds.
+    pub expected_delay_s: Option<f64>,
+    /// A window is judged where the target's amplitude in it is at least this: sqrt(2) times its standard deviation, which is the
+    /// amplitude of a sine. In the unit of the signals.
+    pub minimum_amplitude: f64,
+    /// Actuators that are stepped together.
+    pub n_actuators: usize,
+}
+
+impl Default for MonitorConfig {
+    fn default() -> Self {
+        Self {
+            rate_hz: 1024.0,
+            window_s: 4.0,
+            update_hz: 64.0,
+            band_hz: None,
+            window: Window::Boxcar,
+            detrend: Detrend::Mean,
+            estimator: Estimator::Fei,
+            data_decimation: 1,
+            frequency_decimation: 1,
+            max_delay_s: 0.25,
+            expected_delay_s: None,
+            minimum_amplitude: 0.0,
+            n_actuators: 1,
+        }
+    }
+}
+
+/// Gain and delay of one actuator over the latest window.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// Index of the incoming sample that completed the window.
+    pub index: u64,
+    /// When that sample came, in seconds from sample 0: index / rate.
+    pub time_s: f64,
+    /// Centre of the window, in the same time; the decimator's delay is taken out.
+    pub centre_s: f64,
+    /// From 0.
+    pub actuator: usize,
+    /// A, d, phase, f_eq, their intervals where the estimator gives some, and the reason where there is no number.
+    pub tracking: Tracking,
+}
+
+impl Reading {
+    /// Whether there are numbers.
+    pub fn is_valid(&self) -> bool {
+        !self.tracking.reason.is_some_and(|r| r.is_undetermined())
+    }
+}
+
+/// The checked plan: one for any number of streams of this rate.
+///
+/// ```
+/// use rthstrack::{Estimator, Monitor, MonitorConfig};
+/// let estimator = Estimator::LeastSquares;
+/// let monitor = Monitor::new(MonitorConfig { estimator, data_decimation: 8, update_hz: 16.0, ..Default::default() })?;
+/// let mut state = monitor.state();
+/// // Measured comes 20 ms later and 5 % too small.
+/// let motion = |t: f64| (9.0 * t).sin() + 0.3 * (23.0 * t).sin() + 0.2 * (41.0 * t).cos();
+/// let mut last = None;
+/// for i in 0..8192 {
+///     let t = f64::from(i) / 1024.0;
+///     if let Some([reading]) = monitor.step(&mut state, &[motion(t)], &[0.95 * motion(t - 0.020)]) {
+///         last = Some(*reading);
+///     }
+/// }
+/// let tracking = last.unwrap().tracking;
+/// assert!((tracking.amplitude - 0.95).abs() < 1e-5 && (tracking.delay_s - 0.020).abs() < 1e-6);
+/// # Ok::<(), rthstrack::Error>(())
+/// ```
+pub struct Monitor {
+    config: MonitorConfig,
+    decimator: CausalDecimator,
+    evaluator: Evaluator,
+    /// Samples of the window, and those before it that are kept, after decimation.
+    window: usize,
+    before: usize,
+    /// From one reading to the next, after decimation.
+    hop: usize,
+}
+
+/// What changes per sample: the latest samples of every actuator, and room for one evaluation. It belongs to one thread.
+#[derive(Debug, Clone)]
+pub struct MonitorState {
+    actuators: Vec<ActuatorState>,
+    evaluator: EvaluatorState,
+    readings: Vec<Reading>,
+    /// Of the next incoming sample.
+    index: u64,
+    /// Decimated samples until the next reading.
+    wait: usize,
+}
+
+#[derive(Debug, Clone)]
+struct ActuatorState {
+    filters: [CausalState; 2],
+    target: Ring,
+    measured: Ring,
+}
+
+/// What [`Monitor::process`] did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Processed {
+    /// Samples taken, of every actuator.
+    pub samples: usize,
+    /// Readings written.
+    pub readings: usize,
+}
+
+impl Monitor {
+    /// Checks the settings and plans.
+    ///
+    /// # Errors
+    /// [`Error::Rate`]; [`Error::Setting`] for a window, update or amplitude out of range; [`Error::Band`] and [`Error::NoBin`], also for
+    /// a band that the decimator does not keep; whatever [`Evaluator::new`] refuses.
+    pub fn new(config: MonitorConfig) -> Result<Self> {
+        check_rate(config.rate_hz)?;
+        let decimator = CausalDecimator::new(config.data_decimation)?;
+        let rate_hz = config.rate_hz / config.data_decimation as f64;
+        let setting = |name, expected: String, found| Err(Error::Setting { name, expected, found });
+        if config.n_actuators == 0 {
+            return setting("n_actuators", "at least 1".to_owned(), 0.0);
+        }
+        let samples = (config.window_s * rate_hz).round();
+        let most = MAX_SAMPLES / config.n_actuators as f64;
+        if !(samples >= MIN_SAMPLES as f64 && samples <= most) {
+            let (least_s, most_s) = (MIN_SAMPLES as f64 / rate_hz, most / rate_hz);
+            let expected = format!("from {least_s} to {most_s} s ({MIN_SAMPLES} to {most} samples at {rate_hz} Hz)");
+            return setting("window_s", expected, config.window_s);
+        }
+        if !(config.update_hz > 0.0 && config.update_hz <= rate_hz * (1.0 + 1e-9)) {
+            let expected = format!("above 0 and at most {rate_hz} Hz, the rate after decimation by P");
+            return setting("update_hz", expected, config.update_hz);
+        }
+        if !(config.minimum_amplitude.is_finite() && config.minimum_amplitude >= 0.0) {
+            let expected = "zero or a positive amplitude".to_owned();
+            return setting("minimum_amplitude", expected, config.minimum_amplitude);
+        }
+        if let Some(found) = config.expected_delay_s.filter(|d| !d.is_finite()) {
+            return setting("expected_delay_s", "a finite number of seconds".to_owned(), found);
+        }
+        let window = samples as usize;
+        let evaluator = Evaluator::new(window, rate_hz, config.evaluator()?)?;
+        let before = evaluator.samples_before();
+        let hop = (rate_hz / config.update_hz).round().max(1.0) as usize;
+        Ok(Self { config, decimator, evaluator, window, before, hop })
+    }
+
+    /// The settings.
+    pub fn config(&self) -> &MonitorConfig {
+        &self.config
+    }
+
+    /// The plan of each reading: of [`Monitor::window_len`] samples at [`Monitor::evaluated_rate_hz`].
+    pub fn evaluator(&self) -> &Evaluator {
+        &self.evaluator
+    }
+
+    /// rate / P, in hertz.
+    pub fn evaluated_rate_hz(&self) -> f64 {
+        self.evaluator.rate_hz()
+    }
+
+    /// Samples of a window, after decimation.
+    pub fn window_len(&self) -> usize {
+        self.window
+    }
+
+    /// Readings a second as they come: a whole number of decimated samples apart.
+    pub fn update_hz(&self) -> f64 {
+        self.evaluated_rate_hz() / self.hop as f64
+    }
+
+    /// By how much the newest sample of a window is older than the sample that brings the reading: the decimator's delay, in seconds.
+    pub fn latency_s(&self) -> f64 {
+        self.decimator.delay() as f64 / self.config.rate_hz
+    }
+
+    /// From the centre of a window to the sample that brings its reading, in seconds.
+    pub fn age_s(&self) -> f64 {
+        self.latency_s() + 0.5 * (self.window - 1) as f64 / self.evaluated_rate_hz()
+    }
+
+    /// Incoming samples before the first reading, that one included.
+    pub fn first_reading_len(&self) -> u64 {
+        (2 * self.decimator.delay() + 1 + (self.window - 1) * self.decimator.factor()) as u64
+    }
+
+    /// Nothing seen yet. Only this allocates.
+    pub fn state(&self) -> MonitorState {
+        let ring = || Ring::new(self.before + self.window);
+        let actuator = || ActuatorState {
+            filters: [self.decimator.state(), self.decimator.state()],
+            target: ring(),
+            measured: ring(),
+        };
+        let reading = |actuator| Reading {
+            index: 0,
+            time_s: 0.0,
+            centre_s: 0.0,
+            actuator,
+            tracking: Tracking::undetermined(Reason::Still),
+        };
+        MonitorState {
+            actuators: (0..self.config.n_actuators).map(|_| actuator()).collect(),
+            evaluator: self.evaluator.state(),
+            readings: (0..self.config.n_actuators).map(reading).collect(),
+            index: 0,
+            wait: self.window,
+        }
+    }
+
+    /// Forgets all samples; the next one has this index.
+    pub fn restart(&self, state: &mut MonitorState, index: u64) {
+        for actuator in &mut state.actuators {
+            actuator.filters.iter_mut().for_each(CausalState::clear);
+            actuator.target.clear();
+            actuator.measured.clear();
+        }
+        state.index = index;
+        state.wait = self.window;
+    }
+
+    /// Takes one sample of every actuator, `n_actuators` of each signal; gives their readings where a window is complete.
+    ///
+    /// Allocates nothing, locks nothing, and takes any number: one that is not finite makes the readings whose window holds it
+    /// invalid. Samples missing from a slice that is too short count as not a number; surplus ones are left alone.
+    pub fn step<'s>(&self, state: &'s mut MonitorState, target: &[f64], measured: &[f64]) -> Option<&'s [Reading]> {
+        let index = state.index;
+        state.index = state.index.wrapping_add(1);
+        let mut complete = false;
+        for (a, actuator) in state.actuators.iter_mut().enumerate() {
+            let sample = |signal: &[f64]| signal.get(a).copied().unwrap_or(f64::NAN);
+            let [first, second] = &mut actuator.filters;
+            let shorter = (self.decimator.step(first, sample(target)), self.decimator.step(second, sample(measured)));
+            // Both filters have seen as many samples.
+            let (Some(x), Some(y)) = shorter else { continue };
+            actuator.target.push(x);
+            actuator.measured.push(y);
+            complete = true;
+        }
+        if !complete {
+            return None;
+        }
+        state.wait -= 1;
+        if state.wait > 0 {
+            return None;
+        }
+        state.wait = self.hop;
+        let time_s = index as f64 / self.config.rate_hz;
+        for (actuator, reading) in state.actuators.iter().zip(&mut state.readings) {
+            let tracking = self.judge(&mut state.evaluator, actuator);
+            *reading = Reading { index, time_s, centre_s: time_s - self.age_s(), actuator: reading.actuator, tracking };
+        }
+        Some(&state.readings)
+    }
+
+    /// Takes blocks of samples, actuators side by side (sample 0 of all, sample 1 of all, ...), and writes the readings into
+    /// `out`. Stops early where `out` cannot hold those of the next window: see [`Monitor::readings_in`].
+    pub fn process(
+        &self,
+        state: &mut MonitorState,
+        target: &[f64],
+        measured: &[f64],
+        out: &mut [Reading],
+    ) -> Processed {
+        let n = self.config.n_actuators;
+        let mut done = Processed { samples: 0, readings: 0 };
+        for (target, measured) in target.chunks_exact(n).zip(measured.chunks_exact(n)) {
+            if out.len() - done.readings < n && self.samples_until_reading(state) == 1 {
+                break;
+            }
+            if let Some(readings) = self.step(state, target, measured) {
+                out[done.readings..done.readings + n].copy_from_slice(readings);
+                done.readings += n;
+            }
+            done.samples += 1;
+        }
+        done
+    }
+
+    /// How many readings the next `n_samples` samples bring, of all actuators.
+    pub fn readings_in(&self, state: &MonitorState, n_samples: usize) -> usize {
+        let first = self.samples_until_reading(state);
+        let hop = self.hop * self.decimator.factor();
+        if n_samples < first { 0 } else { ((n_samples - first) / hop + 1) * self.config.n_actuators }
+    }
+
+    /// Samples until the next reading, the one that brings it included.
+    pub fn samples_until_reading(&self, state: &MonitorState) -> usize {
+        let filter = state.actuators.first().map_or(0, |a| a.filters[0].wait());
+        filter + (state.wait - 1) * self.decimator.factor()
+    }
+
+    /// The latest samples of one actuator as they are evaluated, target and measured, oldest first: one window at most.
+    pub fn window<'s>(&self, state: &'s MonitorState, actuator: usize) -> (&'s [f64], &'s [f64]) {
+        let of = |ring: &'s Ring| ring.last(ring.len().min(self.window));
+        state.actuators.get(actuator).map_or((&[], &[]), |a| (of(&a.target), of(&a.measured)))
+    }
+
+    /// The reading of what stands in an actuator's window.
+    fn judge(&self, state: &mut EvaluatorState, actuator: &ActuatorState) -> Tracking {
+        let n = actuator.target.len();
+        let (target, measured) = (actuator.target.last(n), actuator.measured.last(n));
+        let own = &target[n - self.window..];
+        if self.config.minimum_amplitude > 0.0 && amplitude(own) < self.config.minimum_amplitude {
+            return Tracking::undetermined(Reason::Still);
+        }
+        let expected = self.config.expected_delay_s.map(|d| d * self.evaluated_rate_hz());
+        let found = Pair::new(target, measured, self.evaluated_rate_hz())
+            .and_then(|pair| self.evaluator.evaluate_last(state, &pair, expected));
+        match found {
+            Ok(tracking) => tracking,
+            Err(Error::NotFinite { .. }) => Tracking::undetermined(Reason::NotFinite),
+            Err(Error::Range { .. }) => Tracking::undetermined(Reason::Range),
+            // A target that stands still, at every frequency or at those that are kept.
+            Err(_) => Tracking::undetermined(Reason::Still),
+        }
+    }
+}
+
+impl MonitorConfig {
+    /// What evaluates a window of decimated samples.
+    fn evaluator(&self) -> Result<EvaluatorConfig> {
+        let kept_hz = self.rate_hz / (4 * self.data_decimation) as f64;
+        let decimated = self.data_decimation > 1;
+        if let Some((low_hz, high_hz)) = self.band_hz
+            && decimated
+            && high_hz > kept_hz * (1.0 + 1e-9)
+        {
+            let expected = format!("at most {kept_hz} Hz at its upper end, rate / (4 P); lower P");
+            return Err(Error::Setting { name: "band_hz", expected, found: high_hz.max(low_hz) });
+        }
+        // Sums over samples have no upper end: they take what the decimator passes.
+        let open = decimated && self.estimator == Estimator::Fei;
+        Ok(EvaluatorConfig {
+            estimator: self.estimator,
+            data_decimation: 1,
+            frequency_decimation: self.frequency_decimation,
+            decimator: Decimator::Spectral,
+            window: self.window,
+            detrend: self.detrend,
+            band_hz: self.band_hz.or(open.then_some((0.0, kept_hz))),
+            max_delay_s: self.max_delay_s,
+            ..EvaluatorConfig::default()
+        })
+    }
+}
+
+/// sqrt(2) times the standard deviation.
+fn amplitude(samples: &[f64]) -> f64 {
+    let n = samples.len() as f64;
+    let mean = sums::sum(samples) / n;
+    let squares: f64 = sums::spread(samples, mean);
+    (2.0 * squares / n).sqrt()
+}
