@@ -90,6 +90,10 @@ pub struct Reading {
 }
 
 impl Reading {
+    /// A place for a reading, which says nothing yet.
+    pub const EMPTY: Self =
+        Self { index: 0, time_s: 0.0, centre_s: 0.0, actuator: 0, tracking: Tracking::undetermined(Reason::Still) };
+
     /// Whether there are numbers.
     pub fn is_valid(&self) -> bool {
         !self.tracking.reason.is_some_and(|r| r.is_undetermined())
@@ -242,13 +246,7 @@ impl Monitor {
             target: ring(),
             measured: ring(),
         };
-        let reading = |actuator| Reading {
-            index: 0,
-            time_s: 0.0,
-            centre_s: 0.0,
-            actuator,
-            tracking: Tracking::undetermined(Reason::Still),
-        };
+        let reading = |actuator| Reading { actuator, ..Reading::EMPTY };
         MonitorState {
             actuators: (0..self.config.n_actuators).map(|_| actuator()).collect(),
             evaluator: self.evaluator.state(),

@@ -180,7 +180,7 @@ pub struct Tracking {
 
 impl Tracking {
     /// Nothing but the reason.
-    pub(crate) fn undetermined(reason: Reason) -> Self {
+    pub(crate) const fn undetermined(reason: Reason) -> Self {
         Self {
             fei: Complex::new(f64::NAN, f64::NAN),
             amplitude: f64::NAN,
