@@ -53,7 +53,7 @@
     const span = Math.max(high - low, least, 1e-9 * Math.max(Math.abs(low), Math.abs(high)), 1e-300);
     if (last && low >= last[0] && high <= last[1] && last[1] - last[0] <= 3 * span) return last;
     const more = (span - (high - low)) / 2 + 0.03 * span;
-    const step = nice(span / 5);
+    const step = nice(span / 10);
     return [Math.floor((low - more) / step) * step, Math.ceil((high + more) / step) * step];
   }
 
@@ -110,11 +110,11 @@
       return a;
     }
 
-    /* Fills arrays with what to draw of [from, to]: `times`, and for every {column, edge, out} its values. Returns the extremes. */
+    /* Fills arrays with what to draw of [from, to], some `most` points: `times`, and for every {column, edge, out} its values. Returns the extremes. */
     function take(from, to, most, times, wanted) {
       let first = Math.max(firstAtLeast(from) - 1, 0, n - capacity);
       const end = Math.min(firstAtLeast(to) + 1, n);
-      const rung = rungs.find(({ stride }) => (end - first) / stride <= most) || rungs[rungs.length - 1];
+      const rung = rungs.find(({ stride }) => ((end - first) / stride) * (stride > 1 ? 2 : 1) <= most) || rungs[rungs.length - 1];
       const { stride, size } = rung;
       first = Math.floor(first / stride);
       if (first * stride < n - capacity) first++;
@@ -257,11 +257,10 @@
     };
     const amplitude = part("amplitude", "Amplitude A", "");
     const delay = part("delay", "Delay d", "ms");
-    const more = element("div", "more");
     const reason = element("div", "reason");
-    host.append(title, numbers, more, reason);
+    host.append(title, numbers, reason);
     host.addEventListener("click", () => onChoose(number));
-    return { host, verdict, amplitude, delay, more, reason };
+    return { host, verdict, amplitude, delay, reason };
   }
 
   function build(hello) {
@@ -309,6 +308,7 @@
     // ---------------------------------------------------------------------------------------------- charts
 
     const host = (name) => find(`[data-chart="${name}"]`);
+    const height = Math.min(Math.max((innerHeight - 460) / 3, 160), 260); // three below one another fit most screens
     const rolling = Charts.group({ extent: [0, state.span] });
     const pair = (value, around, words) => (value == null ? [] : [around + value, around - value].map((v) => ({ value: v, label: words })));
     const amplitudeLimits = pair(limits.amplitude, 1, `limit 1 ± ${Charts.short(limits.amplitude ?? 0)}`);
@@ -316,17 +316,17 @@
     if (limits.critical_delay_s != null) {
       const critical = 1e3 * limits.critical_delay_s;
       const share = limits.critical_fraction;
-      if (share != null) delayLimits.push({ value: share * critical, label: `${Charts.short(share)} of critical` });
+      if (share != null) delayLimits.push({ value: share * critical, label: `${Charts.short(share)} × critical` });
       delayLimits.push({ value: critical, label: `critical ${Charts.short(critical)} ms` });
     }
 
-    function movingChart(name, label, unit, ideal, column, least, over) {
+    function movingChart(name, label, axisLabel, unit, ideal, column, least, over) {
       const wanted = names.map((_, a) => ({ column: COLUMNS * a + column, out: [] }));
       const edges = [3 + 2 * column, 2 + 2 * column].map((offset) => ({ offset, out: [] }));
       const times = [];
       const options = {
-        x: { label: "Time (s)", name: "t", unit: "s", group: rolling }, y: { label, unit, fixed: [ideal - least / 2, ideal + least / 2] },
-        height: 205, data: [times, ...[...wanted, ...edges].map(({ out }) => out)], references: [{ value: ideal }], limits: over,
+        x: { label: axisLabel, name: "t", unit: "s", group: rolling }, y: { label, unit, fixed: [ideal - least / 2, ideal + least / 2] },
+        height: axisLabel ? height : height - 18, data: [times, ...[...wanted, ...edges].map(({ out }) => out)], references: [{ value: ideal }], limits: [...over],
         series: [
           ...names.map((words, a) => ({ label: words, colour: OWN[a % OWN.length], width: 1.5, dash: DASHES[Math.floor(a / OWN.length) % DASHES.length] })),
           ...edges.map(() => ({ label: "interval", colour: "interval", width: 0.5, silent: true })),
@@ -334,15 +334,15 @@
         intervals: [[n + 1, n + 2]],
       };
       const { u } = Charts.lines(host(name), options);
-      return { u, options, wanted, edges, times, ideal, least, name };
+      return { u, options, wanted, edges, times, ideal, least, name, limits: over };
     }
     const moving = [
-      movingChart("amplitude", "Amplitude A (-)", "", 1, 0, 0.05, amplitudeLimits),
-      movingChart("delay", "Delay d (ms)", "ms", 0, 1, 2, delayLimits),
+      movingChart("amplitude", "Amplitude A (-)", undefined, "", 1, 0, 0.05, amplitudeLimits),
+      movingChart("delay", "Delay d (ms)", "Time (s)", "ms", 0, 1, 2, delayLimits),
     ];
     const scopeAxis = { x: { label: "Time (s)", name: "t", unit: "s" }, y: { label: "Displacement, as sent", fixed: [-1, 1] } };
     const bothSignals = [{ label: "target", colour: "target" }, { label: "measured", colour: "measured" }];
-    const scope = { ...scopeAxis, height: 205, data: [[], [], []], series: bothSignals };
+    const scope = { ...scopeAxis, height, data: [[], [], []], series: bothSignals };
     scope.u = Charts.lines(host("scope"), scope).u;
     const loop = Charts.loop(host("loop"), { x: { label: "Target" }, y: { label: "Measured" }, data: [[0], [0]], size: 330 });
     const spectra = [true, false].map((log) => {
@@ -350,7 +350,7 @@
       const figure = host(log ? "spectrum-log" : "spectrum-linear");
       const options = {
         x: { label: "Frequency (Hz)", name: "f", unit: "Hz", group }, y: { label: "Amplitude, as sent", log, decades: 5, zero: !log },
-        height: 215, data: [[], [], []], series: bothSignals,
+        height: height + 30, data: [[], [], []], series: bothSignals,
       };
       return { u: Charts.lines(figure, options).u, group, log, free: true };
     });
@@ -399,10 +399,8 @@
     const place = ({ u }) => Math.max(Math.round(u.bbox.width / devicePixelRatio), 100);
 
     function timeView() {
-      const last = history.last() ?? 0;
-      const first = history.first() ?? 0;
-      const span = Math.min(state.span, Math.max(last - first, 1));
-      const view = [last - (Number.isFinite(state.span) ? state.span : span), last];
+      const [first, last] = [history.first() ?? 0, history.last() ?? Math.min(state.span, 30)];
+      const view = [Number.isFinite(state.span) ? last - state.span : Math.min(first, last - 1), last];
       rolling.extent = [Math.min(first, view[0]), Math.max(last, view[1])];
       return state.follow ? view : [rolling.min, rolling.max];
     }
@@ -410,20 +408,13 @@
     function drawMoving() {
       const [from, to] = timeView();
       for (const chart of moving) {
-        const { wanted, edges, times, options, ideal, least } = chart;
+        const { wanted, edges, times, options, ideal, least, limits } = chart;
         for (const edge of edges) edge.column = COLUMNS * state.focus + edge.offset;
         const shown = wanted.filter((_, a) => state.all || a === state.focus);
         for (const one of wanted) if (!shown.includes(one)) one.out.length = 0;
-        const [low, high] = history.take(from, to, 2 * place(chart), times, [...shown, ...edges]);
-        let [min, max] = [Math.min(low, ideal), Math.max(high, ideal)];
-        const span = Math.max(max - min, least);
-        // A limit belongs into the view unless the curve would become a flat line by it.
-        for (const { value } of options.limits) {
-          if (value > max && value - min < 4 * span) max = value;
-          if (value < min && max - value < 4 * span) min = value;
-        }
-        options.y.fixed = steady(chart.range, low <= high ? min : NaN, max, least);
-        if (low <= high) chart.range = options.y.fixed;
+        const [low, high] = history.take(from, to, 3 * place(chart), times, [...shown, ...edges]);
+        options.y.fixed = chart.range = steady(chart.range, ...withLimits(low, high, ideal, least, limits), least);
+        options.limits = told(limits, options.y.fixed, ideal);
         options.shades = holes(times, wanted[state.focus].out);
         options.marks = alarms.filter((a) => a.name.endsWith(chart.name) && a.since_s != null).map((a) => ({ at: a.since_s }));
         chart.u.setData(options.data, false);
@@ -432,6 +423,24 @@
       rolling.set(from, to);
       for (const { u } of moving) u.setScale("x", { min: rolling.min, max: rolling.max });
       placing = false;
+    }
+
+    /* What is ideal belongs into the view; a limit too, unless the curve would become a flat line by it. */
+    function withLimits(low, high, ideal, least, limits) {
+      const [min, max] = [Math.min(low, ideal), Math.max(high, ideal)];
+      const reach = 3 * Math.max(max - min, least);
+      const near = limits.map(({ value }) => value).filter((value) => value < max + reach && value > min - reach);
+      return [Math.min(min, ...near), Math.max(max, ...near)];
+    }
+
+    /* The limits in view, and to either side the nearest one where none is: its label stands at the edge. */
+    function told(limits, [min, max], ideal) {
+      const side = (sign) => {
+        const there = limits.filter(({ value }) => sign * (value - ideal) > 0);
+        const inView = there.filter(({ value }) => value >= min && value <= max);
+        return inView.length ? inView : there.sort((a, b) => sign * (a.value - b.value)).slice(0, 1);
+      };
+      return [...side(1), ...side(-1)];
     }
 
     /* Where the chosen actuator has no number: grey. */
@@ -538,7 +547,7 @@
     // ---------------------------------------------------------------------------------------------- words and numbers
 
     function writeCard(a) {
-      const { host, verdict, amplitude, delay, more, reason } = cards[a];
+      const { host, verdict, amplitude, delay, reason } = cards[a];
       const one = latest[a];
       const about = (name) => alarms.filter((alarm) => alarm.actuator === a && alarm.name.endsWith(name));
       let worst = "";
@@ -558,13 +567,12 @@
       write(delay.value, millis(one.delay));
       write(amplitude.interval, between(one.amplitudeLow, one.amplitudeHigh, gain));
       write(delay.interval, between(one.delayLow, one.delayHigh, millis));
-      write(more, [
-        `f ${one.frequency == null ? DASH : `${fixed(one.frequency, 2)} Hz`}`,
-        `phase ${one.phase == null ? DASH : `${fixed((180 / Math.PI) * one.phase, 1)}°`}`,
-        `centred at ${seconds(one.centre)}`,
-      ].join("   "));
-      write(reason, one.reason || "");
-      reason.title = one.reason || "";
+      const words = one.reason || [
+        one.frequency == null ? null : `at ${fixed(one.frequency, 2)} Hz`,
+        one.phase == null ? null : `phase ${fixed((180 / Math.PI) * one.phase, 1)}°`,
+      ].filter(Boolean).join(", ");
+      write(reason, words);
+      if (reason.title !== words) reason.title = words;
     }
 
     const rows = new Map();
@@ -585,19 +593,19 @@
     function writeHealth() {
       const h = frame.health;
       const some = (value) => (value ? "odd" : "");
-      healthRow("Samples received", count(h.received));
-      healthRow("lost", count(h.lost), some(h.lost));
+      healthRow("received", count(h.received));
+      healthRow("lost", count(h.lost), alarms.some((a) => a.active && a.name === "lost") ? "bad" : some(h.lost));
       healthRow("repeated", count(h.repeated), some(h.repeated));
       healthRow("reordered", count(h.reordered), some(h.reordered));
       healthRow("malformed", count(h.malformed), some(h.malformed));
       healthRow("refused", count(h.refused), some(h.refused));
       healthRow("filled", count(h.filled), some(h.filled));
-      healthRow("Restarts", count(h.restarts), some(h.restarts));
+      healthRow("restarts", count(h.restarts), some(h.restarts));
       const off = h.pace_hz != null && Math.abs(h.pace_hz / hello.rate_hz - 1) > 0.05;
-      healthRow("Pace", h.pace_hz == null ? DASH : `${fixed(h.pace_hz, 1)} of ${Charts.short(hello.rate_hz)} Hz`, off ? "odd" : "");
-      healthRow("Last sample", h.age_s == null ? DASH : `${age(h.age_s)} ago`, frame.state === "silent" ? "bad" : "");
-      healthRow("Readings", count(h.readings));
-      healthRow("Log", h.log ?? "none", h.log && h.log !== "writing" ? "bad" : "");
+      healthRow("pace", h.pace_hz == null ? DASH : `${fixed(h.pace_hz, 1)} of ${Charts.short(hello.rate_hz)} Hz`, off ? "odd" : "");
+      healthRow("last sample", h.age_s == null ? DASH : `${age(h.age_s)} ago`, frame.state === "silent" ? "bad" : "");
+      healthRow("readings", count(h.readings));
+      healthRow("log", h.log ?? "none", h.log && h.log !== "writing" ? "bad" : "");
       healthRow("not logged", count(h.log_dropped), h.log_dropped ? "bad" : "");
     }
 
@@ -628,7 +636,7 @@
         const line = element("li", alarm.active ? "active" : "latched");
         const who = alarm.actuator == null ? "" : ` · ${names[alarm.actuator] ?? alarm.actuator}`;
         line.append(element("strong", "", `${WORDS[alarm.name] ?? alarm.name}${who}`), element("span", "words", alarm.text));
-        const since = alarm.since_s == null ? "" : `since ${seconds(alarm.since_s)}`;
+        const since = alarm.since_s == null ? "" : `since t = ${seconds(alarm.since_s)}`;
         line.append(element("span", "note", alarm.active ? since : LATCHED));
         lines.push(line);
       }

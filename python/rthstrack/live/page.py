@@ -1,7 +1,7 @@
 """The live page: a static page and a stream of server-sent events, for a few browsers at once.
 
-The page only reads. It has two routes, takes no input beyond them, and asks its source for nothing but text. A browser that
-is slow, stalled or gone concerns its own thread alone.
+The page only reads. It has two routes, takes no input beyond them, and asks its source for nothing but text. A browser
+that is slow, stalled or gone concerns its own thread alone.
 """
 
 from __future__ import annotations
@@ -56,10 +56,10 @@ class Source(Protocol):
 
 
 class Page:
-    """Serves the live page of `source` at `url`, from construction's port on, between `start` and `stop`.
+    """Serves the live page of `source` at `url`, between `start` and `stop`; the port is taken when constructing.
 
-    port: 0 takes a free one. host: the address to listen at; only this machine can reach the default. allowed_hosts: names by
-    which browsers may call this machine besides its addresses and localhost, where `host` is not loopback.
+    port: 0 takes a free one. host: the address to listen at; only this machine can reach the default. allowed_hosts:
+    names by which browsers may call this machine, besides localhost and its addresses.
     Errors: SettingError where nothing can listen at that address and port.
     """
 
@@ -96,7 +96,9 @@ def _listening(source: Source, host: str, port: int, allowed_hosts: Iterable[str
     if not 0 <= port <= 65535:
         raise SettingError(f"the page's port is {port}; expected 1 to 65535, or 0 for a free one")
     try:
-        (family, _, _, _, address), *_ = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+        (family, _, _, _, address), *_ = socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )
     except (OSError, UnicodeError) as error:
         raise SettingError(
             f"the page cannot listen at {host!r}: not an address of this machine ({error}); take 127.0.0.1"
@@ -213,7 +215,9 @@ class _Handler(BaseHTTPRequestHandler):
         else:
             self._say(HTTPStatus.NOT_FOUND, "There is nothing here; the page is at /.")
 
-    do_HEAD = do_GET  # the same answers, without their content
+    def do_HEAD(self) -> None:
+        """The same answers, without their content."""
+        self.do_GET()
 
     def _route(self) -> str:
         return self.path.partition("?")[0]
@@ -232,7 +236,7 @@ class _Handler(BaseHTTPRequestHandler):
         return None
 
     def _is_ours(self, host: str) -> bool:
-        """Whether `host` is a name of ours: a page elsewhere can make its own name lead to this address (DNS rebinding)."""
+        """Whether `host` is a name of ours: a page elsewhere can let its own name lead to this address (rebinding)."""
         port = self.server.server_port
         called = host.strip().lower()
         if port == 80 and called.rpartition("]")[2].find(":") < 0:
@@ -321,7 +325,7 @@ class _Handler(BaseHTTPRequestHandler):
         """Nothing: the terminal belongs to the monitor."""
 
 
-# ---------------------------------------------------------------------------------------------------- the page's content
+# ---------------------------------------------------------------------------------------------------- the content
 
 
 def _content() -> tuple[bytes, str]:
