@@ -110,11 +110,11 @@
       return a;
     }
 
-    /* Fills arrays with what to draw of [from, to], some `most` points: `times`, and for every {column, edge, out} its values. Returns the extremes. */
+    /* Fills arrays with what to draw of [from, to], at most `most` points: `times`, and for every {column, edge, out} its values. Returns the extremes. */
     function take(from, to, most, times, wanted) {
       let first = Math.max(firstAtLeast(from) - 1, 0, n - capacity);
       const end = Math.min(firstAtLeast(to) + 1, n);
-      const rung = rungs.find(({ stride }) => ((end - first) / stride) * (stride > 1 ? 2 : 1) <= most) || rungs[rungs.length - 1];
+      const rung = rungs.find(({ stride }) => ((end - first) / stride) * (stride > 1 ? 3 : 1) <= most) || rungs[rungs.length - 1];
       const { stride, size } = rung;
       first = Math.floor(first / stride);
       if (first * stride < n - capacity) first++;
@@ -294,7 +294,7 @@
       cards[state.focus].host.focus();
     }));
     choice("which", n > 1 ? [[true, "all"], [false, "the chosen one"]] : [], state.all, (all) => { state.all = all; curves(); });
-    choice("span", [[30, "30 s"], [120, "2 min"], [600, "10 min"], [Infinity, "all"]], 30, (span) => { state.span = span; follow(); });
+    choice("span", [[30, "30 s"], [120, "2 min"], [600, "10 min"], [Infinity, "all kept"]], 30, (span) => { state.span = span; follow(); });
     const spans = [...new Set([2, 4, hello.window_s])].sort((a, b) => a - b);
     choice("scope", spans.map((s) => [s, s === hello.window_s ? `window, ${Charts.short(s)} s` : `${s} s`]), state.scope,
       (scope) => { state.scope = scope; redraw(); });
@@ -308,7 +308,7 @@
     // ---------------------------------------------------------------------------------------------- charts
 
     const host = (name) => find(`[data-chart="${name}"]`);
-    const height = Math.min(Math.max((innerHeight - 460) / 3, 160), 260); // three below one another fit most screens
+    const height = Math.min(Math.max((innerHeight - 460) / 3, 175), 260); // three below one another fit most screens
     const rolling = Charts.group({ extent: [0, state.span] });
     const pair = (value, around, words) => (value == null ? [] : [around + value, around - value].map((v) => ({ value: v, label: words })));
     const amplitudeLimits = pair(limits.amplitude, 1, `limit 1 ± ${Charts.short(limits.amplitude ?? 0)}`);
@@ -340,7 +340,7 @@
       movingChart("amplitude", "Amplitude A (-)", undefined, "", 1, 0, 0.05, amplitudeLimits),
       movingChart("delay", "Delay d (ms)", "Time (s)", "ms", 0, 1, 2, delayLimits),
     ];
-    const scopeAxis = { x: { label: "Time (s)", name: "t", unit: "s" }, y: { label: "Displacement, as sent", fixed: [-1, 1] } };
+    const scopeAxis = { x: { label: "Time (s)", name: "t", unit: "s" }, y: { label: "Displacement", fixed: [-1, 1] } };
     const bothSignals = [{ label: "target", colour: "target" }, { label: "measured", colour: "measured" }];
     const scope = { ...scopeAxis, height, data: [[], [], []], series: bothSignals };
     scope.u = Charts.lines(host("scope"), scope).u;
@@ -349,7 +349,7 @@
       const group = Charts.group({ extent: [0, hello.rate_hz / 2], home: hello.band_hz || [0, hello.rate_hz / 2] });
       const figure = host(log ? "spectrum-log" : "spectrum-linear");
       const options = {
-        x: { label: "Frequency (Hz)", name: "f", unit: "Hz", group }, y: { label: "Amplitude, as sent", log, decades: 5, zero: !log },
+        x: { label: "Frequency (Hz)", name: "f", unit: "Hz", group }, y: { label: "Amplitude", log, decades: 5, zero: !log },
         height: height + 30, data: [[], [], []], series: bothSignals,
       };
       return { u: Charts.lines(figure, options).u, group, log, free: true };
@@ -533,7 +533,8 @@
       [asked, drawnAt] = [false, now];
       const start = performance.now();
       turn++;
-      drawMoving();
+      // Long spans hardly move from one frame to the next.
+      if (all || turn % 2 === 0 || (rolling.max - rolling.min) / place(moving[0]) < 0.1) drawMoving();
       if (all || turn % 2 === 0) drawScope();
       if (all || turn % 2 === 1) drawLoop();
       if (all || spectrumIsNew) drawSpectrum();
@@ -631,6 +632,8 @@
       if (shown === shownAlarms) return;
       shownAlarms = shown;
       const lines = trouble ? [element("li", trouble.kind, trouble.words)] : [];
+      const active = alarms.filter((alarm) => alarm.active).length;
+      if (alarms.length > 6) lines.push(element("li", "count", `${active} alarms are active, ${alarms.length - active} latched.`));
       const order = [...alarms].sort((a, b) => Number(b.active) - Number(a.active));
       for (const alarm of order) {
         const line = element("li", alarm.active ? "active" : "latched");
@@ -653,7 +656,9 @@
     function addReading([index, time, centre, actuator, A, d, phase, f, aLow, aHigh, dLow, dHigh, valid, reason]) {
       if (!(actuator >= 0 && actuator < n)) return;
       if (index !== row) {
-        if (time < history.last()) forget(); // the sender began anew
+        const last = history.last();
+        if (last != null && time < last) forget(); // the sender began anew
+        else if (last != null && time - last > 0.5 + 4 / hello.update_hz) leaveGap(last);
         history.begin(time);
         row = index;
       }
@@ -666,10 +671,17 @@
       };
     }
 
+    /* So that no line is drawn across a time of which nothing is known. */
+    function leaveGap(time) {
+      history.begin(time);
+      for (let c = 0; c < COLUMNS * n; c++) history.put(c, null);
+    }
+
     function forget() {
       history.clear();
       kept.clear();
       row = null;
+      follow();
     }
 
     let writtenAt = 0;

@@ -256,9 +256,10 @@ class _Handler(BaseHTTPRequestHandler):
                 return
             self._head(HTTPStatus.OK, "text/event-stream; charset=utf-8")
             if self.command != "HEAD":
+                cursor = self._last_cursor()
                 self._send(f"retry: {RETRY_MS}\n\n")
-                self._event("hello", self.server.source.hello())
-                self._frames(self._last_cursor())
+                self._event("hello", self.server.source.hello(), cursor)
+                self._frames(cursor)
 
     def _frames(self, cursor: int) -> None:
         source, stopping = self.server.source, self.server.stopping
@@ -280,7 +281,7 @@ class _Handler(BaseHTTPRequestHandler):
         known = run == self.server.run and cursor.isascii() and cursor.isdigit() and len(cursor) < 19
         return int(cursor) if known else 0
 
-    def _event(self, name: str, text: str, cursor: int = 0) -> None:
+    def _event(self, name: str, text: str, cursor: int) -> None:
         line = text.replace("\r", " ").replace("\n", " ")  # between JSON's tokens; inside a text they are escaped
         self._send(f"id: {self.server.run}-{cursor}\nevent: {name}\ndata: {line}\n\n")
 
