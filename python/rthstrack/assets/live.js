@@ -416,7 +416,9 @@
         options.y.fixed = chart.range = steady(chart.range, ...withLimits(low, high, ideal, least, limits), least);
         options.limits = told(limits, options.y.fixed, ideal);
         options.shades = holes(times, wanted[state.focus].out);
-        options.marks = alarms.filter((a) => a.name.endsWith(chart.name) && a.since_s != null).map((a) => ({ at: a.since_s }));
+        options.marks = alarms
+          .filter((a) => a.name.endsWith(chart.name) && a.since_s != null && (state.all || a.actuator === state.focus))
+          .map((a) => ({ at: a.since_s }));
         chart.u.setData(options.data, false);
       }
       placing = true;
@@ -430,7 +432,8 @@
       const [min, max] = [Math.min(low, ideal), Math.max(high, ideal)];
       const reach = 3 * Math.max(max - min, least);
       const near = limits.map(({ value }) => value).filter((value) => value < max + reach && value > min - reach);
-      return [Math.min(min, ...near), Math.max(max, ...near)];
+      const [bottom, top] = [Math.min(min, ...near), Math.max(max, ...near)];
+      return [bottom, top > max ? top + 0.13 * (top - bottom) : top]; // room for the label above its line
     }
 
     /* The limits in view, and to either side the nearest one where none is: its label stands at the edge. */
@@ -628,10 +631,14 @@
 
     /* Anew only where something changed, so that it can be read, copied and spoken. */
     function writeAlarms(trouble) {
-      const shown = JSON.stringify([alarms.map((a) => [a.name, a.actuator, a.active, a.latched, a.text]), trouble]);
-      if (shown === shownAlarms) return;
+      const shown = JSON.stringify([alarms.map((a) => [a.name, a.actuator, a.active, a.latched, a.text]), trouble && trouble.kind]);
+      if (shown === shownAlarms) {
+        if (trouble) write(find(".alerts").firstElementChild, trouble.words);
+        return;
+      }
       shownAlarms = shown;
       const lines = trouble ? [element("li", trouble.kind, trouble.words)] : [];
+      for (const line of lines) line.setAttribute("aria-live", "off"); // the state is spoken, not every second of it
       const active = alarms.filter((alarm) => alarm.active).length;
       if (alarms.length > 6) lines.push(element("li", "count", `${active} alarms are active, ${alarms.length - active} latched.`));
       const order = [...alarms].sort((a, b) => Number(b.active) - Number(a.active));
@@ -744,7 +751,8 @@
     }
     if (run) run.writeAlarms(trouble(state, frame));
     else if (quiet) find(".alerts").replaceChildren(element("li", "trouble", trouble(state, null).words));
-    document.title = `${run && run.alarmed() ? "ALARM · " : ""}${STATES[state] ?? state} · rthstrack monitor`;
+    const title = `${run && run.alarmed() ? "ALARM · " : ""}${STATES[state] ?? state} · rthstrack monitor`;
+    if (document.title !== title) document.title = title;
   }
 
   function greet(event) {
