@@ -535,6 +535,21 @@ def test_silence_and_waiting_are_unmistakable(serve: Callable[..., Page], opened
     page.until_state("running")
 
 
+def test_a_still_actuator_is_drawn_as_a_line(
+    serve: Callable[..., Page], opened: Callable[..., Opened], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = MadeUp(1)
+    monkeypatch.setattr(source, "target", np.zeros_like)
+    source.reason[0] = "not determined: too little motion to judge by"
+    source.fill(10)
+    page = opened(serve(source))
+    page.until("Number(document.documentElement.dataset.frames || 0) > 10")
+    scale = "(({min, max}) => [min, max])(document.querySelector('[data-chart=\"scope\"]').chart.u.scales.y)"
+    low, high = page.page.evaluate(scale)
+    assert low < 0 < high
+    assert 0.5 < high - low < 5
+
+
 def test_a_script_in_a_name_a_reason_or_an_event_is_only_text(
     serve: Callable[..., Page], opened: Callable[..., Opened]
 ) -> None:

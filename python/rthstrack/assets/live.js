@@ -1,6 +1,6 @@
 "use strict";
-/* The live page: takes the monitor's events, keeps the last half hour, and draws it. All numbers come from the monitor;
- * here they are only written and thinned. Every text goes to textContent: a name or a reason is never read as markup. */
+/* The live page: takes the monitor's events, keeps the last half hour, and draws it. All numbers come from the
+ * monitor; here they are only written and thinned. Every text goes to textContent: a name is never read as markup. */
 (() => {
   const LOST_MS = 1500;
   const KEPT_S = 1800;
@@ -11,7 +11,10 @@
   const WRITE_MS = 150; // numbers that change more often cannot be read
   const OWN = ["value", "error", "second", "third"]; // colours of the actuators, names of charts.css
   const DASHES = [undefined, [8, 3], [3, 3], [8, 3, 2, 3]];
-  const WORDS = { delay: "Delay", amplitude: "Amplitude", critical_delay: "Critical delay", lost: "Lost samples", silence: "Silence" };
+  const WORDS = {
+    delay: "Delay", amplitude: "Amplitude", critical_delay: "Critical delay", lost: "Lost samples", silence: "Silence",
+  };
+  const FULL = "Not connected: as many browsers as may are watching already; close one of them.";
   const LATCHED = "latched — advisory — reset at the terminal or by control datagram";
 
   const root = document.documentElement;
@@ -39,7 +42,7 @@
   const millis = (value) => (value == null ? DASH : fixed(1e3 * value, Math.abs(value) < 0.1 ? 2 : 1));
   const count = (value) => (value == null ? DASH : String(value).replace(/\B(?=(\d{3})+$)/g, "\u202f"));
   const between = (low, high, write) => (low == null || high == null ? "" : `${write(low)} to ${write(high)}`);
-  const age = (value) => (value < 10 ? `${value.toFixed(1)} s` : value < 120 ? `${value.toFixed(0)} s` : `${(value / 60).toFixed(0)} min`);
+  const age = (value) => (value < 120 ? `${value.toFixed(value < 10 ? 1 : 0)} s` : `${(value / 60).toFixed(0)} min`);
 
   /* The smallest of 1, 2, 5 times a power of ten that is at least `value`. */
   function nice(value) {
@@ -50,7 +53,8 @@
   /* A range that stands still while it can: widened at once, narrowed when less than a third of it is used. */
   function steady(last, low, high, least) {
     if (!(low <= high)) return last || [-least / 2, least / 2];
-    const span = Math.max(high - low, least, 1e-9 * Math.max(Math.abs(low), Math.abs(high)), 1e-300);
+    const size = Math.max(Math.abs(low), Math.abs(high));
+    const span = Math.max(high - low, least, 1e-9 * size) || 1; // a signal of zeros has a span too
     if (last && low >= last[0] && high <= last[1] && last[1] - last[0] <= 3 * span) return last;
     const more = (span - (high - low)) / 2 + 0.03 * span;
     const step = nice(span / 10);
@@ -59,16 +63,16 @@
 
   // ------------------------------------------------------------------------------------------------ what is kept
 
-  /* Rows of numbers over time in a ring, and above them rungs that hold the extremes of 4, 16, 64 and 256 rows, so that any
-   * span is drawn from a few thousand points. */
+  /* Rows of numbers over time in a ring, and above them rungs that hold the extremes of 4, 16, 64 and 256 rows, so that
+   * any span is drawn from a few thousand points. */
   function ladder(nColumns, atLeast) {
     const capacity = 256 * Math.ceil(atLeast / 256);
     const rungs = [1, 4, 16, 64, 256].map((stride) => {
       const size = capacity / stride;
-      const columns = () => Array.from({ length: nColumns }, () => new Float32Array(size));
-      const low = columns();
-      const high = stride === 1 ? low : columns();
-      return { stride, size, low, high, time: new Float64Array(size), hole: Array.from({ length: nColumns }, () => new Uint8Array(size)) };
+      const columns = (Type) => Array.from({ length: nColumns }, () => new Type(size));
+      const low = columns(Float32Array);
+      const high = stride === 1 ? low : columns(Float32Array);
+      return { stride, size, low, high, time: new Float64Array(size), hole: columns(Uint8Array) };
     });
     let n = 0;
 
@@ -110,11 +114,13 @@
       return a;
     }
 
-    /* Fills arrays with what to draw of [from, to], at most `most` points: `times`, and for every {column, edge, out} its values. Returns the extremes. */
+    /* Fills arrays with what to draw of [from, to], at most `most` points: `times`, and for every {column, out} its
+     * values. Returns the extremes. */
     function take(from, to, most, times, wanted) {
       let first = Math.max(firstAtLeast(from) - 1, 0, n - capacity);
       const end = Math.min(firstAtLeast(to) + 1, n);
-      const rung = rungs.find(({ stride }) => ((end - first) / stride) * (stride > 1 ? 3 : 1) <= most) || rungs[rungs.length - 1];
+      const fits = ({ stride }) => ((end - first) / stride) * (stride > 1 ? 3 : 1) <= most;
+      const rung = rungs.find(fits) || rungs[rungs.length - 1];
       const { stride, size } = rung;
       first = Math.floor(first / stride);
       if (first * stride < n - capacity) first++;
@@ -135,7 +141,8 @@
         const next = k + 1 < Math.ceil(n / stride) ? rung.time[(k + 1) % size] : timeOf(n - 1);
         times.push((rung.time[slot] + next) / 2);
         for (const { column, out } of wanted) {
-          out.push(rung.hole[column][slot] || rung.high[column][slot] !== rung.high[column][slot] ? null : rung.high[column][slot]);
+          const high = rung.high[column][slot];
+          out.push(rung.hole[column][slot] || high !== high ? null : high);
         }
       }
       return [least, greatest];
@@ -201,8 +208,8 @@
     return [low, high];
   }
 
-  /* The extremes of every `stride` samples, at the same places in every signal; `offset` samples are gone already, so that
-   * groups keep theirs while the signal rolls. */
+  /* The extremes of every `stride` samples, at the same places in every signal; `offset` samples are gone already, so
+   * that groups keep theirs while the signal rolls. */
   function thinned(values, stride, offset) {
     const [at, kept] = [[], []];
     const push = (k, v) => { at.push(k); kept.push(Number.isFinite(v) ? v : null); };
@@ -219,7 +226,7 @@
     return [at, kept];
   }
 
-  // ------------------------------------------------------------------------------------------------ the page of one run
+  // ------------------------------------------------------------------------------------------------ one run
 
   /* Buttons of which one is down. options: [[value, words]]. */
   function choice(name, options, chosen, onChange) {
@@ -287,20 +294,30 @@
     const cards = names.map((name, a) => card(name, a, (chosen) => focus(chosen)));
     find(".cards").replaceChildren(...cards.map(({ host }) => host));
     cards.forEach(({ host }, a) => host.addEventListener("keydown", (event) => {
-      const to = { ArrowRight: a + 1, ArrowDown: a + 1, ArrowLeft: a - 1, ArrowUp: a - 1, Home: 0, End: n - 1, " ": a, Enter: a }[event.key];
+      const to = {
+        ArrowRight: a + 1, ArrowDown: a + 1, ArrowLeft: a - 1, ArrowUp: a - 1, Home: 0, End: n - 1, " ": a, Enter: a,
+      }[event.key];
       if (to === undefined) return;
       event.preventDefault();
       focus((to + n) % n);
       cards[state.focus].host.focus();
     }));
-    choice("which", n > 1 ? [[true, "all"], [false, "the chosen one"]] : [], state.all, (all) => { state.all = all; curves(); });
-    choice("span", [[30, "30 s"], [120, "2 min"], [600, "10 min"], [Infinity, "all kept"]], 30, (span) => { state.span = span; follow(); });
+    choice("which", n > 1 ? [[true, "all"], [false, "the chosen one"]] : [], state.all, (all) => {
+      state.all = all;
+      curves();
+    });
+    choice("span", [[30, "30 s"], [120, "2 min"], [600, "10 min"], [Infinity, "all kept"]], state.span, (span) => {
+      state.span = span;
+      follow();
+    });
     const spans = [...new Set([2, 4, hello.window_s])].sort((a, b) => a - b);
-    choice("scope", spans.map((s) => [s, s === hello.window_s ? `window, ${Charts.short(s)} s` : `${s} s`]), state.scope,
+    const spanWords = (s) => (s === hello.window_s ? `window, ${Charts.short(s)} s` : `${s} s`);
+    choice("scope", spans.map((s) => [s, spanWords(s)]), state.scope,
       (scope) => { state.scope = scope; redraw(); });
     choice("scale", [[true, "logarithmic"], [false, "linear"]], true, (log) => {
       state.log = log;
-      for (const one of [true, false]) host(one ? "spectrum-log" : "spectrum-linear").parentElement.hidden = one !== log;
+      host("spectrum-log").parentElement.hidden = !log;
+      host("spectrum-linear").parentElement.hidden = log;
       redraw();
     });
     find(".follow").addEventListener("click", follow);
@@ -310,9 +327,13 @@
     const host = (name) => find(`[data-chart="${name}"]`);
     const height = Math.min(Math.max((innerHeight - 460) / 3, 175), 260); // three below one another fit most screens
     const rolling = Charts.group({ extent: [0, state.span] });
-    const pair = (value, around, words) => (value == null ? [] : [around + value, around - value].map((v) => ({ value: v, label: words })));
-    const amplitudeLimits = pair(limits.amplitude, 1, `limit 1 ± ${Charts.short(limits.amplitude ?? 0)}`);
-    const delayLimits = pair(limits.delay_s == null ? null : 1e3 * limits.delay_s, 0, `limit ${Charts.short(1e3 * (limits.delay_s ?? 0))} ms`);
+    const delayLimit = limits.delay_s == null ? null : 1e3 * limits.delay_s;
+    const pair = (value, around, words) => {
+      if (value == null) return [];
+      return [around + value, around - value].map((at) => ({ value: at, label: words(Charts.short(value)) }));
+    };
+    const amplitudeLimits = pair(limits.amplitude, 1, (value) => `limit 1 ± ${value}`);
+    const delayLimits = pair(delayLimit, 0, (value) => `limit ${value} ms`);
     if (limits.critical_delay_s != null) {
       const critical = 1e3 * limits.critical_delay_s;
       const share = limits.critical_fraction;
@@ -325,10 +346,16 @@
       const edges = [3 + 2 * column, 2 + 2 * column].map((offset) => ({ offset, out: [] }));
       const times = [];
       const options = {
-        x: { label: axisLabel, name: "t", unit: "s", group: rolling }, y: { label, unit, fixed: [ideal - least / 2, ideal + least / 2] },
-        height: axisLabel ? height : height - 18, data: [times, ...[...wanted, ...edges].map(({ out }) => out)], references: [{ value: ideal }], limits: [...over],
+        x: { label: axisLabel, name: "t", unit: "s", group: rolling },
+        y: { label, unit, fixed: [ideal - least / 2, ideal + least / 2] },
+        height: axisLabel ? height : height - 18,
+        data: [times, ...[...wanted, ...edges].map(({ out }) => out)],
+        references: [{ value: ideal }], limits: [...over],
         series: [
-          ...names.map((words, a) => ({ label: words, colour: OWN[a % OWN.length], width: 1.5, dash: DASHES[Math.floor(a / OWN.length) % DASHES.length] })),
+          ...names.map((words, a) => ({
+            label: words, colour: OWN[a % OWN.length], width: 1.5,
+            dash: DASHES[Math.floor(a / OWN.length) % DASHES.length],
+          })),
           ...edges.map(() => ({ label: "interval", colour: "interval", width: 0.5, silent: true })),
         ],
         intervals: [[n + 1, n + 2]],
@@ -344,12 +371,15 @@
     const bothSignals = [{ label: "target", colour: "target" }, { label: "measured", colour: "measured" }];
     const scope = { ...scopeAxis, height, data: [[], [], []], series: bothSignals };
     scope.u = Charts.lines(host("scope"), scope).u;
-    const loop = Charts.loop(host("loop"), { x: { label: "Target" }, y: { label: "Measured" }, data: [[0], [0]], size: 330 });
+    const loop = Charts.loop(host("loop"), {
+      x: { label: "Target" }, y: { label: "Measured" }, data: [[0], [0]], size: 330,
+    });
     const spectra = [true, false].map((log) => {
       const group = Charts.group({ extent: [0, hello.rate_hz / 2], home: hello.band_hz || [0, hello.rate_hz / 2] });
       const figure = host(log ? "spectrum-log" : "spectrum-linear");
       const options = {
-        x: { label: "Frequency (Hz)", name: "f", unit: "Hz", group }, y: { label: "Amplitude", log, decades: 5, zero: !log },
+        x: { label: "Frequency (Hz)", name: "f", unit: "Hz", group },
+        y: { label: "Amplitude", log, decades: 5, zero: !log },
         height: height + 30, data: [[], [], []], series: bothSignals,
       };
       return { u: Charts.lines(figure, options).u, group, log, free: true };
@@ -463,7 +493,7 @@
       const [target, measured] = ["target", "measured"].map((name) => kept.take(name, state.focus, state.scope));
       const first = kept.n - target.length;
       const start = kept.end_s - (target.length - 1) / kept.rate_hz;
-      scope.y.fixed = scope.range = steady(scope.range, ...extremes(target, measured), 1e-6 * Math.abs(scope.range ? scope.range[1] : 0));
+      scope.y.fixed = scope.range = steady(scope.range, ...extremes(target, measured), 0);
       const stride = Math.ceil(target.length / (2 * place(scope)));
       const times = (places) => places.map((k) => start + k / kept.rate_hz);
       if (stride <= 2) {
@@ -504,7 +534,8 @@
       let k = f.length - 1;
       while (k > 1 && !(target[k] > 1e-3 * peak)) k--;
       one.reach = steady(one.reach && [0, one.reach], 0, 2 * f[k], f[1] * 8)[1];
-      one.group.home = hello.band_hz ? [hello.band_hz[0], Math.min(hello.band_hz[1], top)] : [0, Math.min(one.reach, top)];
+      const [from, to] = hello.band_hz || [0, one.reach];
+      one.group.home = [from, Math.min(to, top)];
       const clean = (values) => Array.from(values, (v) => (v != null && (v > 0 || !one.log) ? v : null));
       one.u.setData([f, clean(target), clean(measured)], false);
       one.placing = true;
@@ -606,7 +637,8 @@
       healthRow("filled", count(h.filled), some(h.filled));
       healthRow("restarts", count(h.restarts), some(h.restarts));
       const off = h.pace_hz != null && Math.abs(h.pace_hz / hello.rate_hz - 1) > 0.05;
-      healthRow("pace", h.pace_hz == null ? DASH : `${fixed(h.pace_hz, 1)} of ${Charts.short(hello.rate_hz)} Hz`, off ? "odd" : "");
+      const pace = h.pace_hz == null ? DASH : `${fixed(h.pace_hz, 1)} of ${Charts.short(hello.rate_hz)} Hz`;
+      healthRow("pace", pace, off ? "odd" : "");
       healthRow("last sample", h.age_s == null ? DASH : `${age(h.age_s)} ago`, frame.state === "silent" ? "bad" : "");
       healthRow("readings", count(h.readings));
       healthRow("log", h.log ?? "none", h.log && h.log !== "writing" ? "bad" : "");
@@ -631,7 +663,8 @@
 
     /* Anew only where something changed, so that it can be read, copied and spoken. */
     function writeAlarms(trouble) {
-      const shown = JSON.stringify([alarms.map((a) => [a.name, a.actuator, a.active, a.latched, a.text]), trouble && trouble.kind]);
+      const lasting = alarms.map((a) => [a.name, a.actuator, a.active, a.latched, a.text]);
+      const shown = JSON.stringify([lasting, trouble && trouble.kind]);
       if (shown === shownAlarms) {
         if (trouble) write(find(".alerts").firstElementChild, trouble.words);
         return;
@@ -640,18 +673,21 @@
       const lines = trouble ? [element("li", trouble.kind, trouble.words)] : [];
       for (const line of lines) line.setAttribute("aria-live", "off"); // the state is spoken, not every second of it
       const active = alarms.filter((alarm) => alarm.active).length;
-      if (alarms.length > 6) lines.push(element("li", "count", `${active} alarms are active, ${alarms.length - active} latched.`));
+      const howMany = `${active} alarms are active, ${alarms.length - active} latched.`;
+      if (alarms.length > 6) lines.push(element("li", "count", howMany));
       const order = [...alarms].sort((a, b) => Number(b.active) - Number(a.active));
       for (const alarm of order) {
         const line = element("li", alarm.active ? "active" : "latched");
         const who = alarm.actuator == null ? "" : ` · ${names[alarm.actuator] ?? alarm.actuator}`;
-        line.append(element("strong", "", `${WORDS[alarm.name] ?? alarm.name}${who}`), element("span", "words", alarm.text));
+        line.append(element("strong", "", `${WORDS[alarm.name] ?? alarm.name}${who}`));
+        line.append(element("span", "words", alarm.text));
         const since = alarm.since_s == null ? "" : `since t = ${seconds(alarm.since_s)}`;
         line.append(element("span", "note", alarm.active ? since : LATCHED));
         lines.push(line);
       }
       const watched = ["delay_s", "amplitude", "critical_delay_s"].some((name) => limits[name] != null);
-      if (!lines.length) lines.push(element("li", "calm", watched ? "No alarm." : "No alarm. No limit is set for amplitude or delay."));
+      const calm = watched ? "No alarm." : "No alarm. No limit is set for amplitude or delay.";
+      if (!lines.length) lines.push(element("li", "calm", calm));
       find(".alerts").replaceChildren(...lines);
       for (const { name } of moving) {
         host(name).parentElement.classList.toggle("over", alarms.some((a) => a.active && a.name.endsWith(name)));
@@ -725,7 +761,9 @@
 
   let [run, told, runName, lastFrame, refused, since] = [null, null, null, null, null, performance.now()];
 
-  const STATES = { connecting: "Connecting", running: "Running", waiting: "Waiting", silent: "Silent", lost: "Lost connection" };
+  const STATES = {
+    connecting: "Connecting", running: "Running", waiting: "Waiting", silent: "Silent", lost: "Lost connection",
+  };
 
   /* What to tell beside the state; the numbers' age belongs to it. */
   function trouble(state, frame) {
@@ -784,7 +822,7 @@
       stream.close();
       try {
         const answer = await fetch("events", { method: "HEAD" });
-        refused = answer.status === 503 ? "Not connected: as many browsers as may are watching already; close one of them." : null;
+        refused = answer.status === 503 ? FULL : null;
       } catch {
         refused = null;
       }
