@@ -131,19 +131,21 @@
       for (let k = first; k < last; k++) {
         const slot = k % size;
         times.push(rung.time[slot]);
-        for (const { column, out } of wanted) {
+        for (const one of wanted) {
+          const { column, out } = one;
           const [low, high, hole] = [rung.low[column][slot], rung.high[column][slot], rung.hole[column][slot]];
           if (low < least) least = low;
           if (high > greatest) greatest = high;
-          out.push(low !== low ? null : stride === 1 || !hole ? low : Math.abs(low) > Math.abs(high) ? low : high);
+          // First the extreme nearer to what came before; of a group with a hole, the larger, and then the hole.
+          const before = out[out.length - 1] ?? 0;
+          const highFirst = hole ? Math.abs(high) > Math.abs(low) : Math.abs(high - before) < Math.abs(low - before);
+          out.push(low !== low ? null : highFirst ? high : low);
+          one.next = low !== low || hole ? null : highFirst ? low : high;
         }
         if (stride === 1) continue;
         const next = k + 1 < Math.ceil(n / stride) ? rung.time[(k + 1) % size] : timeOf(n - 1);
         times.push((rung.time[slot] + next) / 2);
-        for (const { column, out } of wanted) {
-          const high = rung.high[column][slot];
-          out.push(rung.hole[column][slot] || high !== high ? null : high);
-        }
+        for (const { out, next } of wanted) out.push(next);
       }
       return [least, greatest];
     }
