@@ -4,8 +4,8 @@
  *     gcc -std=c99 -O2 realtime.c -o realtime $(pkg-config --cflags --libs rthstrack) -lm
  *     ./realtime [SECONDS] [--fast]
  *
- * 60 seconds unless told otherwise; --fast does not wait between samples. As root, or with the limits rtprio and memlock
- * raised, it runs under SCHED_FIFO with its memory locked.
+ * 60 seconds unless told otherwise; --fast does not wait between samples. As root, or with the limits rtprio and
+ * memlock raised, it runs under SCHED_FIFO with its memory locked.
  */
 #define _POSIX_C_SOURCE 200809L
 
@@ -81,8 +81,13 @@ static void print_reading(const rthstrack_reading *r) {
         printf("%7.3f s   %s\n", r->time_s, rthstrack_reason_text(r->reason));
         return;
     }
-    printf("%7.3f s   A %.6f   d %9.5f ms   f_eq %7.4f Hz   95 %% of d %9.5f to %9.5f ms\n", r->time_s, r->amplitude,
-           1e3 * r->delay_s, r->equivalent_frequency_hz, 1e3 * r->delay_interval_s[0], 1e3 * r->delay_interval_s[1]);
+    printf("%7.3f s   A %.6f   d %9.5f ms   f_eq %7.4f Hz", r->time_s, r->amplitude, 1e3 * r->delay_s,
+           r->equivalent_frequency_hz);
+    /* None where gain and delay are not constant over frequency, as this plant's are not. */
+    if (r->delay_interval_s[0] <= r->delay_interval_s[1]) {
+        printf("   d in %.5f to %.5f ms", 1e3 * r->delay_interval_s[0], 1e3 * r->delay_interval_s[1]);
+    }
+    putchar('\n');
 }
 
 static void become_real_time(void) {

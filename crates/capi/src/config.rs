@@ -127,8 +127,8 @@ impl rthstrack_monitor_config {
 
     pub(crate) fn misfit(size: u32, abi_version: u32) -> String {
         format!(
-            "config.size and config.abi_version must be {} and {RTHSTRACK_ABI_VERSION}, not {size} and {abi_version}: compile \
-             with this library's rthstrack.h and fill config by rthstrack_monitor_config_default",
+            "config.size and config.abi_version must be {} and {RTHSTRACK_ABI_VERSION}, not {size} and {abi_version}: \
+             compile with this library's rthstrack.h and fill config by rthstrack_monitor_config_default",
             Self::SIZE
         )
     }

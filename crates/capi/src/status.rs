@@ -154,8 +154,8 @@ impl Code {
                 c"not determined: magnitudes leave the range of double precision; scale the signals to a usual unit"
             }
             Code::RTHSTRACK_REASON_TOO_SHORT => {
-                c"not determined: too few samples are left for which the shifted target is known; lower max_delay_s or take \
-                  a longer window"
+                c"not determined: too few samples are left for which the shifted target is known; lower max_delay_s or \
+                  take a longer window"
             }
             Code::RTHSTRACK_REASON_FEW_CYCLES => {
                 c"not determined: target goes through too little of a cycle, at least 0.6 is needed; take a longer \
@@ -173,8 +173,8 @@ impl Code {
                   distance to choose the one near zero"
             }
             Code::RTHSTRACK_REASON_BEYOND_MAX_DELAY => {
-                c"not determined: the best delay lies beyond max_delay_s, or beyond a quarter of the window; raise it or \
-                  take a longer window"
+                c"not determined: the best delay lies beyond max_delay_s, or beyond a quarter of the window; raise it \
+                  or take a longer window"
             }
             Code::RTHSTRACK_REASON_OPPOSITE_SIGN => {
                 c"not determined: measured moves against target; does one of them have the opposite sign?"

@@ -17,14 +17,15 @@ const PREAMBLE: &str = "\
  *     ... at the end:
  *     rthstrack_monitor_destroy(monitor);
  *
- * Only _create and _destroy use the heap. All other functions are real-time safe: no heap, no lock, no wait, no log, no
- * system call, bounded work. No function lets a panic or an exception out. Pointers must be null (and are then refused),
- * or point to memory of the stated type and length that nothing else changes during the call; what is written to may not
- * overlap what is read. A pointer to a monitor or an actuator comes from _create and has not been through _destroy. Each
- * such object may be used by one thread at a time, not always the same; functions without one may be called from any.
+ * Only _create and _destroy use the heap. All other functions are real-time safe: no heap, no lock, no wait, no
+ * log, no system call, bounded work. No function lets a panic or an exception out. Pointers must be null (and are
+ * then refused), or point to memory of the stated type and length that nothing else changes during the call; what
+ * is written to may not overlap what is read. A pointer to a monitor or an actuator comes from _create and has not
+ * been through _destroy. Each such object may be used by one thread at a time, not always the same; functions
+ * without one may be called from any.
  *
- * Numbers of statuses, reasons and choices never change their meaning. Whatever else a program can see of a structure or
- * a function changes only together with RTHSTRACK_ABI_VERSION.
+ * Numbers of statuses, reasons and choices never change their meaning. Whatever else a program can see of a
+ * structure or a function changes only together with RTHSTRACK_ABI_VERSION.
  *
  * Made by cbindgen from the sources of crates/capi. Do not edit, but:
  * RTHSTRACK_BLESS=1 cargo test -p rthstrack-capi --test header */";
