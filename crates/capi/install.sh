@@ -26,7 +26,9 @@ if [ -z "$built" ]; then
 fi
 
 # What a program needs that carries the Rust library within itself, as the compiler says.
-native=$(: | rustc --crate-type staticlib --crate-name empty --print native-static-libs -o "$(mktemp -d)/empty.a" - 2>&1 \
+empty=$(mktemp -d)
+trap 'rm -rf "$empty"' EXIT
+native=$(: | rustc --crate-type staticlib --crate-name empty --print native-static-libs -o "$empty/empty.a" - 2>&1 \
     | sed -n 's/^note: native-static-libs: //p')
 [ -n "$native" ] || { echo "$0: rustc did not say which libraries its own needs"; exit 1; }
 

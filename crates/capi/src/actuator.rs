@@ -7,7 +7,7 @@ use rthstrack::dynamics::{
     ServoHydraulic,
 };
 
-use crate::boundary::{Soundness, guarded, is_sound_out, write_message};
+use crate::boundary::{Soundness, guarded, is_sound_out, may_change_threads, write_message};
 use crate::status::rthstrack_status::{self, *};
 
 /// The servo-hydraulic actuator of the RTHS benchmark problem (Silva et al. 2020) with its specimen, nominal values:
@@ -19,6 +19,8 @@ pub struct rthstrack_actuator {
     state: SampledActuatorState,
     soundness: Soundness,
 }
+
+const _: () = may_change_threads::<rthstrack_actuator>();
 
 /// The nominal plant, nothing between it and the computer.
 fn benchmark() -> Actuator {

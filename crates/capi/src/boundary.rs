@@ -31,6 +31,9 @@ impl Soundness {
     }
 }
 
+/// What may go from thread to thread, as the header says of the objects.
+pub(crate) const fn may_change_threads<T: Send>() {}
+
 /// Whether a pointer can be read from, as far as that can be seen.
 pub(crate) fn is_sound<T>(pointer: *const T) -> bool {
     !pointer.is_null() && pointer.is_aligned()

@@ -5,7 +5,7 @@ use std::slice;
 
 use rthstrack::{Monitor, MonitorState};
 
-use crate::boundary::{Soundness, guarded, is_sound, is_sound_out, write_message};
+use crate::boundary::{Soundness, guarded, is_sound, is_sound_out, may_change_threads, write_message};
 use crate::config::rthstrack_monitor_config;
 use crate::reading::rthstrack_reading;
 use crate::status::rthstrack_status::{self, *};
@@ -18,6 +18,8 @@ pub struct rthstrack_monitor {
     state: MonitorState,
     soundness: Soundness,
 }
+
+const _: () = may_change_threads::<rthstrack_monitor>();
 
 /// Room for readings in the caller's memory.
 struct Room {

@@ -71,17 +71,17 @@ pub enum rthstrack_reason {
     RTHSTRACK_REASON_NOT_FINITE = 2,
     /// Magnitudes leave the range of double precision.
     RTHSTRACK_REASON_RANGE = 3,
-    /// Too few samples are left for which the shifted target is known: reason_values[0] of them.
+    /// Too few samples are left for which the shifted target is known: `reason_values[0]` of them.
     RTHSTRACK_REASON_TOO_SHORT = 4,
-    /// The target goes through too little of a cycle: reason_values[0] cycles.
+    /// The target goes through too little of a cycle: `reason_values[0]` cycles.
     RTHSTRACK_REASON_FEW_CYCLES = 5,
-    /// Too little of measured follows the target: the share reason_values[0].
+    /// Too little of measured follows the target: the share `reason_values[0]`.
     RTHSTRACK_REASON_LOW_COHERENCE = 6,
-    /// Noise leaves the delay uncertain by more than half a turn: reason_values[0] seconds either way.
+    /// Noise leaves the delay uncertain by more than half a turn: `reason_values[0]` seconds either way.
     RTHSTRACK_REASON_UNCERTAIN = 7,
-    /// Two delays fit equally well: reason_values, in seconds.
+    /// Two delays fit equally well: `reason_values`, in seconds.
     RTHSTRACK_REASON_AMBIGUOUS = 8,
-    /// The best delay lies beyond reason_values[0] seconds, the largest taken.
+    /// The best delay lies beyond `reason_values[0]` seconds, the largest taken.
     RTHSTRACK_REASON_BEYOND_MAX_DELAY = 9,
     /// Measured moves against the target.
     RTHSTRACK_REASON_OPPOSITE_SIGN = 10,
@@ -89,7 +89,7 @@ pub enum rthstrack_reason {
     RTHSTRACK_REASON_NO_CONVERGENCE = 11,
     /// Another reason without numbers.
     RTHSTRACK_REASON_OTHER = 99,
-    /// No interval: the residual follows the target with coherence reason_values[0].
+    /// No interval: the residual follows the target with coherence `reason_values[0]`.
     RTHSTRACK_REASON_RESIDUAL_FOLLOWS_TARGET = 100,
     /// No interval: too few frequency bins to know the noise by.
     RTHSTRACK_REASON_FEW_BINS = 101,

@@ -1,4 +1,5 @@
-/* The C interface as a C program meets it. Built and run by tests/c.rs, as it is, under valgrind, and with the heap counted. */
+/* The C interface as a C program meets it. Built and run by tests/c.rs: as it is, under valgrind, and with
+ * the heap counted. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -28,7 +29,10 @@ void __real_free(void *old);
 void *__wrap_malloc(size_t size) { heap_calls++; return __real_malloc(size); }
 void *__wrap_calloc(size_t n, size_t size) { heap_calls++; return __real_calloc(n, size); }
 void *__wrap_realloc(void *old, size_t size) { heap_calls++; return __real_realloc(old, size); }
-void *__wrap_aligned_alloc(size_t alignment, size_t size) { heap_calls++; return __real_aligned_alloc(alignment, size); }
+void *__wrap_aligned_alloc(size_t alignment, size_t size) {
+    heap_calls++;
+    return __real_aligned_alloc(alignment, size);
+}
 int __wrap_posix_memalign(void **out, size_t alignment, size_t size) {
     heap_calls++;
     return __real_posix_memalign(out, alignment, size);
@@ -38,6 +42,7 @@ void __wrap_free(void *old) { heap_calls++; __real_free(old); }
 static const size_t heap_calls = 0;
 #endif
 
+/* Readings and samples of most tests. */
 enum { ROOM = 64, N_SAMPLES = 600 };
 
 static char message[256];
@@ -158,8 +163,9 @@ static void another_interface_is_refused(void) {
     rthstrack_monitor_config config, before;
     memset(&config, 0x5a, sizeof config);
     before = config;
-    CHECK(rthstrack_monitor_config_default(&config, sizeof config - 4, RTHSTRACK_ABI_VERSION) == RTHSTRACK_ABI_MISMATCH);
-    CHECK(rthstrack_monitor_config_default(&config, sizeof config, RTHSTRACK_ABI_VERSION + 1) == RTHSTRACK_ABI_MISMATCH);
+    const size_t size = sizeof config;
+    CHECK(rthstrack_monitor_config_default(&config, size - 4, RTHSTRACK_ABI_VERSION) == RTHSTRACK_ABI_MISMATCH);
+    CHECK(rthstrack_monitor_config_default(&config, size, RTHSTRACK_ABI_VERSION + 1) == RTHSTRACK_ABI_MISMATCH);
     CHECK(memcmp(&config, &before, sizeof config) == 0);
     rthstrack_monitor *monitor = (rthstrack_monitor *)&config;
     CHECK(rthstrack_monitor_create(&config, &monitor, message, sizeof message) == RTHSTRACK_ABI_MISMATCH);
@@ -282,14 +288,14 @@ static void blocks_give_the_bits_of_steps(void) {
         CHECK(by_steps[i].actuator == i % N && by_steps[i].valid);
     }
 
-    /* Room for one window's readings at a time. */
+    /* Room for one window's readings at a time, or for one reading more. */
     CHECK(rthstrack_monitor_restart(other, 0) == RTHSTRACK_OK);
     done = written = 0;
     size_t calls = 0;
     for (rthstrack_status status = RTHSTRACK_NO_ROOM; status == RTHSTRACK_NO_ROOM; calls++) {
         size_t n_taken, n_readings;
         status = rthstrack_monitor_process(other, target + done * N, measured + done * N, N_SAMPLES - done,
-                                           by_blocks + written, N + 1, &n_taken, &n_readings);
+                                           by_blocks + written, N + calls % 2, &n_taken, &n_readings);
         CHECK(status == RTHSTRACK_OK || status == RTHSTRACK_NO_ROOM);
         CHECK(n_readings == N);
         done += n_taken;
@@ -314,7 +320,8 @@ static void without_room_the_sample_is_not_taken(void) {
     CHECK(n_readings == 0 && rthstrack_monitor_samples_until_reading(monitor) == 128);
     CHECK(rthstrack_monitor_step(monitor, x, x, readings, 2, &n_readings) == RTHSTRACK_OK);
     CHECK(rthstrack_monitor_samples_until_reading(monitor) == 127);
-    CHECK(rthstrack_monitor_process(monitor, x, x, SIZE_MAX, readings, 2, &n_taken, &n_readings) == RTHSTRACK_BAD_LENGTH);
+    CHECK(rthstrack_monitor_process(monitor, x, x, SIZE_MAX, readings, 2, &n_taken, &n_readings)
+          == RTHSTRACK_BAD_LENGTH);
     CHECK(rthstrack_monitor_process(monitor, x, x, SIZE_MAX / 16, readings, 2, &n_taken, &n_readings)
           == RTHSTRACK_BAD_LENGTH);
     CHECK(n_taken == 0 && n_readings == 0 && rthstrack_monitor_samples_until_reading(monitor) == 127);
