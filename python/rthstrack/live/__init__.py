@@ -1,1 +1,1 @@
-"""The on-line monitor beside its compiled part: layout of the input, log, terminal view."""
+"""The on-line monitor: what stands around the compiled `Live`. `page` shows a run in browsers."""

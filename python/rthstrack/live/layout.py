@@ -24,6 +24,7 @@ Source = Literal["udp", "lines"]
 _TYPES = {"f32": "f4", "f64": "f8", "i16": "i2", "u16": "u2", "i32": "i4", "u32": "u4", "i64": "i8", "u64": "u8"}
 # What one UDP datagram can hold over IPv4.
 _MOST_BYTES = 65507
+_MOST_ACTUATORS = 256
 _OF_DATAGRAMS = ("byte_order", "header_bytes", "sample_bytes", "type")
 _OF_LINES = ("format", "delimiter")
 _WHOLE = Kind("a whole number from 0 on", whole)
@@ -134,7 +135,8 @@ class DatagramLayout(_Layout[Field]):
             out[:, field.offset : field.end] = column
 
         if self.counter is not None:
-            write(self.counter, counter)
+            # Single precision counts no further.
+            write(self.counter, counter % (1 << 24) if self.counter.type == "f32" else counter)
         for i, one in enumerate(self.actuators):
             write(one.target, _raw(one.target, target[:, i]))
             write(one.measured, _raw(one.measured, measured[:, i]))
@@ -199,6 +201,8 @@ def layout_from(table: Mapping[str, Any], source: Source, file: str | os.PathLik
     root = _Table(table, source)
     layout = _datagram(root) if source == "udp" else _line(root)
     root.close()
+    if layout is not None and layout.n_actuators > _MOST_ACTUATORS:
+        root.mistakes.append(("", f"expected at most {_MOST_ACTUATORS} actuators, found {layout.n_actuators}"))
     if root.mistakes:
         raise ConfigurationError(file, dict.fromkeys(root.mistakes))
     assert layout is not None
