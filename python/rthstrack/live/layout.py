@@ -391,8 +391,8 @@ def _line(root: Table) -> LineLayout | None:
     delimiter = root.take(
         "delimiter",
         Kind(
-            "one character, such as ',', ';', ' ' or '\\t'",
-            lambda value: value if isinstance(value, str) and len(value) == 1 and value.isascii() else None,
+            "one character that is no part of a number, such as ',', ';', ' ' or '\\t'",
+            lambda value: value if isinstance(value, str) and re.fullmatch(r"[^\w+\-.\"\r\n]", value) else None,
         ),
         None,
     )
