@@ -235,7 +235,7 @@ def test_a_full_disk_stops_the_log_and_not_the_monitor_and_what_is_written_stays
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith(f"1 the log {path} stopped: File too large; ")
-    assert 30_000 < path.stat().st_size <= 60_000
+    assert 10_000 < path.stat().st_size <= 60_000
     # What did not fit was taken out again: whole batches only, and room for the end marker or not.
     table = pa.ipc.open_stream(path).read_all()
     assert table["index"].to_numpy().tolist() == list(range(table.num_rows))

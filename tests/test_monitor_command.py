@@ -182,11 +182,12 @@ def test_every_option_reaches_the_compiled_part(
     status, _, _ = run(
         capsys, "--listen", "udp://localhost:5005", "--rate", "2048", "--window", "2", "--update", "64", "--band", "1",
         "20", "-P", "4", "-Q", "2", "--estimator", "fei", "--window-shape", "hann", "--detrend", "linear",
-        "--max-delay", "0.1", "--expected-delay", "-0.02", "--minimum-amplitude", "0.5",
-        "--limit-delay", "0.02", "--limit-amplitude", "0.1", "--critical-delay", "0.03", "--critical-fraction", "0.4", "--limit-lost", "7", "--silence", "2",
-        "--hysteresis", "0", "--alarm-after", "0.5", "--no-latch", "--alarm-to", "udp://127.0.0.1:7001", "--control",
-        "7002", "--readings", tmp_path / "r.jsonl", "--readings", "udp://127.0.0.1:7003", "--log",
-        tmp_path / "l.arrows", "--allow", "127.0.0.1", "--allow", "::1", "--fill", "0", "--any-pace",
+        "--max-delay", "0.1", "--expected-delay", "-0.02", "--minimum-amplitude", "0.5", "--limit-delay", "0.02",
+        "--limit-amplitude", "0.1", "--critical-delay", "0.03", "--critical-fraction", "0.4", "--limit-lost", "7",
+        "--silence", "2", "--hysteresis", "0", "--alarm-after", "0.5", "--no-latch", "--alarm-to",
+        "udp://127.0.0.1:7001", "--control", "7002", "--readings", tmp_path / "r.jsonl", "--readings",
+        "udp://127.0.0.1:7003", "--log", tmp_path / "l.arrows", "--allow", "127.0.0.1", "--allow", "::1", "--fill", "0",
+        "--any-pace",
     )  # fmt: skip
     assert status == 0
     made = fake.made

@@ -96,6 +96,8 @@ class Log:
             with contextlib.suppress(OSError):
                 path.unlink()
             raise
+        # The first array makes pyarrow import pandas where there is one: half a second that is not to be spent later.
+        pa.array(np.zeros(1))
         source.note_log("writing")
 
     def start(self) -> None:
