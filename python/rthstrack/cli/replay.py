@@ -70,10 +70,11 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
     _check(layout, signals, args)
     n, k = len(signals.target), args.samples_per_datagram
     pace_hz = signals.rate_hz * args.speed
-    say(f"{args.file}: {told}")
     bursts = ", in bursts of a millisecond" if pace_hz / k > 1 / _BURST_S else ""
-    say(f"sending {n} samples of {signals.n_actuators} actuator(s) at {pace_hz:g} Hz to udp://{args.to}"
-         f"{bursts}{', over and over' if args.loop else ''}; Ctrl-C ends")  # fmt: skip
+    say(
+        f"sending {n} samples of {told}, at {pace_hz:g} Hz to udp://{args.to}{bursts}"
+        f"{', over and over' if args.loop else ''}; Ctrl-C ends"
+    )
     with Ended() as ended:
         sent = _send(signals, layout, args, ended)
     refused = f"; {sent.refused} datagrams found nobody listening" if sent.refused else ""
@@ -102,9 +103,9 @@ def _read(args: argparse.Namespace) -> tuple[str, _Signals]:
             f"{args.file}: no sampling rate: {recording.rate_source}; give --rate HZ or --time CHANNEL"
         )
     if args.target:
-        pairs, why = list(zip(args.target, args.measured, strict=True)), "named by the user"
+        pairs = list(zip(args.target, args.measured, strict=True))
     else:
-        pairs, why = propose_pair(recording)
+        pairs, _ = propose_pair(recording)
     if args.fill:
         recording = recording.filled(args.fill)
     recording = recording.scaled(dict(args.scale))
@@ -119,9 +120,10 @@ def _read(args: argparse.Namespace) -> tuple[str, _Signals]:
                              "and --measured")  # fmt: skip
     if not all(lengths.values()):
         raise RecordingError(f"{args.file}: there are no samples to send")
-    names = ", ".join(f"target '{target.name}', measured '{measured.name}'" for target, measured in channels)
+    names = ", ".join(f"target '{target.name}', measured '{measured.name}'" for target, measured in channels[:3])
+    names += f" and {len(channels) - 3} more pairs" if len(channels) > 3 else ""
     target, measured = (np.column_stack([pair[i].values for pair in channels]) for i in (0, 1))
-    return f"{names} ({why})", _Signals(recording.rate_hz, target, measured)
+    return names, _Signals(recording.rate_hz, target, measured)
 
 
 def _check(layout: DatagramLayout, signals: _Signals, args: argparse.Namespace) -> None:
