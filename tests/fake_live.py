@@ -105,19 +105,25 @@ class FakeLive:
     def status(self) -> str:
         now_s = self._now_s()
         alarm = {
-            "name": "delay", "actuator": 0, "active": True, "latched": False, "since_s": self.alarm_after_s,
-            "value": 0.021, "limit": 0.02, "text": "advisory: |d| is 21 ms, limit 20 ms",
+            "name": "delay", "actuator": 0, "active": self.alarmed(), "latched": False, "since_s": self.alarm_after_s,
+            "value": 0.021, "limit": 0.02,
+            "text": "advisory: actuator 0: delay of 21.000 ms, limit 20.000 ms either way",
         }  # fmt: skip
-        row = [0, now_s, now_s - 2, 0, 1.02, 0.0123, -0.1, 2.5, 1.01, 1.03, 0.0121, 0.0125, True, None]
+        reading = {
+            "index": 0, "time_s": now_s, "centre_s": now_s - 2, "actuator": 0, "amplitude": 1.02, "delay_s": 0.0123,
+            "phase_rad": -0.1, "equivalent_frequency_hz": 2.5, "amplitude_interval": [1.01, 1.03],
+            "delay_interval_s": [0.0121, 0.0125], "valid": True, "reason": None,
+        }  # fmt: skip
+        raised = [{"time_s": self.alarm_after_s, "text": alarm["text"]}] if self.alarmed() else []
         log = next(iter(self.log[-1:]), None)
         return json.dumps(
             {
                 "time_s": now_s,
                 "state": "running",
                 "health": HEALTH | {"received": int(now_s * self.rate_hz), "pace_hz": self.rate_hz, "log": log},
-                "readings": [row],
-                "alarms": [alarm] if self.alarmed() else [],
-                "events": list(self.events),
+                "readings": [reading, *[None] * (self.n_actuators - 1)],
+                "alarms": [alarm],
+                "events": [*self.events, *raised],
             }
         )
 

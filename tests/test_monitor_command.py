@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pytest
 
@@ -91,6 +92,7 @@ def test_all_mistakes_are_told_at_once_a_line_each_and_nothing_is_started(
         ([*UDP, "--listen", "udp://no such host:1"], "--listen: expected an address or the name of a machine"),
         ([*UDP, "--listen", "5005"], "--listen: expected udp://HOST:PORT, such as udp://127.0.0.1:5005, found '5005'"),
         ([*UDP, "--fill", "-1"], "--fill: expected a whole number from 0 on"),
+        ([*UDP, "--fill", "5000"], "--fill: expected at most the 4096 samples of the window, found 5000"),
         ([*UDP, "--allow", "no such host"], "--allow: expected an address"),
         ([*UDP, "--update", "2000"], "--update: expected at most the 1024 samples a second"),
         ([*UDP, "-P", "64"], "--band: expected HI of at most half the rate, 16 Hz after -P 64, 8 Hz, found 32"),
@@ -214,7 +216,7 @@ def test_lines_on_standard_input_come_at_any_pace(capsys: pytest.CaptureFixture[
     status, _, err = run(capsys, "--listen", "-", "--rate", "100")
     assert status == 0
     source = fake.made.source
-    assert (source["kind"], source["address"], source["check_pace"]) == ("lines", "", False)
+    assert (source["kind"], source["address"], source["check_pace"]) == ("lines", None, False)
     assert source["layout"]["format"] == "auto"
     # A quarter of the rate is less than 32 Hz.
     assert fake.made.monitor["band_hz"] == (0.0, 25.0)
@@ -282,7 +284,7 @@ def test_events_and_alarms_are_a_line_each_and_once(capsys: pytest.CaptureFixtur
     assert status == 0
     assert err[1:] == [
         "rthstrack: at 0.10 s: 12 samples lost, the window starts anew",
-        "rthstrack: ALARM at 0.20 s: actuator 0: advisory: |d| is 21 ms, limit 20 ms",
+        "rthstrack: ALARM at 0.20 s: advisory: actuator 0: delay of 21.000 ms, limit 20.000 ms either way",
     ]
 
 
@@ -414,6 +416,56 @@ def read_until(file: int, text: bytes) -> bytes:
     return seen
 
 
+def drawn(status: dict[str, Any], names: tuple[str, ...]) -> str:
+    from rich.console import Console
+
+    from rthstrack.live.view import shown
+
+    console = Console(width=150, color_system=None)
+    with console.capture() as capture:
+        console.print(shown(status, "about", names, ["at 1.00 s: something"], with_keys=False))
+    return capture.get()
+
+
+def test_the_view_tells_what_is_not_valid_not_there_and_over_with_the_names_of_the_layout() -> None:
+    alarm = {
+        "name": "delay",
+        "actuator": 1,
+        "active": False,
+        "latched": True,
+        "text": "advisory: actuator 1: delay of 9",
+    }
+    silent = {
+        "name": "silence",
+        "actuator": None,
+        "active": True,
+        "latched": False,
+        "text": "advisory: no sample for 2 s",
+    }
+    idle = {"name": "lost", "actuator": None, "active": False, "latched": False, "text": "advisory: 0 samples missing"}
+    nothing = dict.fromkeys(
+        ("amplitude", "delay_s", "equivalent_frequency_hz", "amplitude_interval", "delay_interval_s")
+    )
+    reading = nothing | {"actuator": 1, "valid": False, "reason": "the target moves less than minimum_amplitude"}
+    health = {"received": 7, "lost": 0, "malformed": 3, "pace_hz": None, "log": "stopped: disk full", "log_dropped": 0}
+    status = {
+        "time_s": None, "state": "silent", "health": health, "readings": [None, reading],
+        "alarms": [alarm, silent, idle], "events": [],
+    }  # fmt: skip
+    text = drawn(status, ("north", "south"))
+    lines = text.splitlines()
+    assert "no reading yet" in next(line for line in lines if line.startswith("north"))
+    south = next(line for line in lines if line.startswith("south"))
+    assert "not determined" in south
+    assert "the target moves less than minimum_amplitude" in south
+    assert "silent 7 received, 0 lost, 3 malformed" in text
+    assert "log: stopped: disk full" in text
+    assert "ALARM advisory: south: delay of 9 (over, held until it is reset)" in text
+    assert "ALARM advisory: no sample for 2 s\n" in text
+    assert "0 samples missing" not in text
+    assert "at 1.00 s: something" in text
+
+
 def test_nobody_reading_standard_error_is_no_reason_to_stop() -> None:
     with started(*UDP, "--duration", "1") as process:
         assert process.stderr is not None
@@ -443,3 +495,125 @@ def test_a_page_is_served_at_the_address_that_is_told(capsys: pytest.CaptureFixt
     assert status == 0
     assert re.search(r"live page: http://127\.0\.0\.1:\d+/", err[1])
     assert fake.made.outputs["page"] is True
+
+
+# With the compiled part ------------------------------------------------------------------------------------------------
+
+compiled = pytest.mark.skipif(not hasattr(_core, "Live"), reason="this build has no rthstrack._core.Live")
+RATE_HZ, GAIN, DELAY_S = 512.0, 1.05, 0.012
+
+
+def motion(t: np.ndarray) -> np.ndarray:
+    return 10 * np.sin(2 * np.pi * 3 * t) + 4 * np.sin(2 * np.pi * 5.3 * t + 1)
+
+
+@pytest.fixture
+def recorded(tmp_path: Path) -> Path:
+    """Three seconds of a motion that is answered 5 % too large and 12 ms late."""
+    t = np.arange(3 * int(RATE_HZ)) / RATE_HZ
+    path = tmp_path / "test.npz"
+    np.savez(path, target=motion(t), measured=GAIN * motion(t - DELAY_S), rate_hz=RATE_HZ)
+    return path
+
+
+class Monitored:
+    """`rthstrack monitor` as a process, from when it listens on."""
+
+    def __init__(self, *arguments: object) -> None:
+        command = [sys.executable, "-m", "rthstrack", "monitor", "--listen", "udp://127.0.0.1:0", "--rate", "512",
+                   "--window", "1", *map(str, arguments)]  # fmt: skip
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        assert self.process.stderr is not None
+        found = re.search(r"monitoring udp 127\.0\.0\.1:(\d+):", self.process.stderr.readline())
+        assert found is not None
+        self.port = int(found[1])
+
+    def replay(self, path: Path) -> None:
+        assert main(["replay", str(path), "--to", f"udp://127.0.0.1:{self.port}"]) == 0
+
+    def end(self, number: int | None = signal.SIGTERM) -> tuple[int, dict[str, int], str]:
+        """Exit status, summary and standard error; number: None waits until it ends of itself."""
+        if number is not None:
+            time.sleep(0.3)
+            self.process.send_signal(number)
+        out, err = self.process.communicate(timeout=20)
+        (line,) = out.splitlines()
+        summary: dict[str, int] = json.loads(line)["summary"]
+        assert list(summary) == KEYS
+        return self.process.returncode, summary, err
+
+
+@compiled
+def test_what_is_replayed_is_read_with_its_gain_and_delay_and_logged_to_the_last_sample(
+    recorded: Path, tmp_path: Path
+) -> None:
+    lines, log = tmp_path / "readings.jsonl", tmp_path / "run.arrows"
+    monitored = Monitored("--readings", lines, "--log", log, "--silence", "100")
+    monitored.replay(recorded)
+    status, summary, err = monitored.end()
+    assert status == 0
+    n = 3 * int(RATE_HZ)
+    totals = {"received": n, "lost": 0, "repeated": 0, "reordered": 0, "malformed": 0, "alarms": 0}
+    assert {key: summary[key] for key in totals} == totals
+    assert "ALARM" not in err
+    readings = [json.loads(line) for line in lines.read_text().splitlines()]
+    assert len(readings) == summary["readings"] == 33  # from one second to three, 16 a second
+    assert all(reading["valid"] for reading in readings)
+    for reading in readings:
+        assert reading["amplitude"] == pytest.approx(GAIN, rel=1e-3)
+        assert reading["delay_s"] == pytest.approx(DELAY_S, abs=1e-4)
+    logged = pa.ipc.open_stream(log).read_all()
+    with np.load(recorded) as sent:
+        np.testing.assert_array_equal(logged["target_1"].to_numpy(), sent["target"])
+        np.testing.assert_array_equal(logged["measured_1"].to_numpy(), sent["measured"])
+    assert pa.ipc.open_stream(tmp_path / "run.readings.arrows").read_all().num_rows == len(readings)
+
+
+@compiled
+def test_a_delay_beyond_its_limit_ends_it_with_status_3(recorded: Path) -> None:
+    monitored = Monitored("--limit-delay", "0.01", "--exit-on-alarm")
+    monitored.replay(recorded)
+    status, summary, err = monitored.end(None)
+    assert status == 3
+    assert summary["alarms"] == 1
+    assert re.search(r"ALARM at [\d.]+ s: advisory: actuator 0: delay of 1[12]\.\d+ ms, limit 10\.000 ms", err)
+
+
+@compiled
+def test_garbage_is_counted_and_changes_nothing(recorded: Path) -> None:
+    monitored = Monitored("--silence", "100")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+        for length in (0, 1, 23, 25, 1000):
+            sock.sendto(os.urandom(length), ("127.0.0.1", monitored.port))
+    monitored.replay(recorded)
+    status, summary, _ = monitored.end()
+    assert status == 0
+    assert (summary["malformed"], summary["lost"], summary["received"]) == (5, 0, 3 * 512)
+
+
+@compiled
+def test_a_port_that_is_taken_is_one_line_and_status_1(capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = taken.getsockname()[1]
+        status, out, err = run(capsys, "--listen", f"udp://127.0.0.1:{port}", "--rate", "512")
+    assert (status, out, len(err)) == (1, "", 1)
+    assert f"127.0.0.1:{port}" in err[0]
+    assert "in use" in err[0]
+
+
+@compiled
+@pytest.mark.parametrize("header", ["n,target,measured\n", ""])
+def test_lines_on_standard_input_are_read_to_their_end(header: str, tmp_path: Path) -> None:
+    t = np.arange(1024) / RATE_HZ
+    columns = np.column_stack([np.arange(1024), motion(t), GAIN * motion(t - DELAY_S)])
+    content = header + "".join(f"{n:.0f},{target:.17g},{measured:.17g}\n" for n, target, measured in columns)
+    readings = tmp_path / "readings.jsonl"
+    command = [sys.executable, "-m", "rthstrack", "monitor", "--listen", "-", "--rate", "512", "--window", "1"]
+    done = subprocess.run(
+        [*command, "--readings", str(readings)], input=content, capture_output=True, text=True, timeout=30, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["summary"]["received"] == 1024
+    last = json.loads(readings.read_text().splitlines()[-1])
+    assert last["delay_s"] == pytest.approx(DELAY_S, abs=1e-4)

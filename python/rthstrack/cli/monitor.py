@@ -16,7 +16,7 @@ from rthstrack.cli.running import Ended, say
 from rthstrack.errors import RthstrackError, SettingError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterator, Mapping
 
     from rthstrack._core import Live
     from rthstrack.live.log import Log
@@ -28,7 +28,9 @@ _IN_WORDS = {
     "filled": "samples filled by a straight line",
     "restarts": "restarts of the window",
     "refused": "datagrams of senders that are not allowed",
-    "log_dropped": "samples that the log could not take",
+    "log_dropped": "samples or readings that the log could not take",
+    "not_written": "readings that the file could not take",
+    "unsent": "datagrams that could not be sent",
 }
 # The status is looked at so often.
 _PERIOD_S = 0.1
@@ -181,33 +183,28 @@ def _watch(args: argparse.Namespace, plan: Plan, live: Live, ended: Ended, about
 
 
 class _News:
-    """What a status says that the last one did not: alarms raised and over, events."""
+    """The events of a status that were not in the last one."""
 
     def __init__(self, names: tuple[str, ...]) -> None:
         self._names = names
-        self._alarms: dict[tuple[Any, Any], bool] = {}
-        self._events: dict[tuple[Any, str], None] = {}
+        self._known: dict[tuple[Any, str], None] = {}
 
-    def of(self, status: Mapping[str, Any]) -> Iterable[tuple[str, bool]]:
+    def of(self, status: Mapping[str, Any]) -> Iterator[tuple[str, bool]]:
         """Lines, and whether each is an alarm's."""
-        from rthstrack.live.view import alarm_text
+        from rthstrack.live.view import named
 
-        texts = {alarm["text"] for alarm in status["alarms"]}
-        for alarm in status["alarms"]:
-            which = (alarm["name"], alarm["actuator"])
-            if alarm["active"] and not self._alarms.get(which):
-                yield f"ALARM {_at(alarm.get('since_s'))}{alarm_text(alarm, self._names)}", True
-            elif not alarm["active"] and self._alarms.get(which):
-                yield f"alarm over {_at(status.get('time_s'))}{alarm_text(alarm | {'active': True}, self._names)}", True
-            self._alarms[which] = alarm["active"]
         for event in status["events"]:
             key = (event["time_s"], event["text"])
-            if key not in self._events and event["text"] not in texts:
-                yield f"{_at(event['time_s'])}{event['text']}", False
-            self._events[key] = None
-        # The status shows recent ones only; so many are enough to know them by.
-        while len(self._events) > 1024:
-            del self._events[next(iter(self._events))]
+            # What the log says of itself is told where it happens.
+            if key in self._known or event["text"].startswith("log: "):
+                continue
+            self._known[key] = None
+            is_alarm = event["text"].startswith("advisory")
+            raised = is_alarm and not event["text"].endswith(" is over")
+            yield f"{'ALARM ' if raised else ''}{_at(event['time_s'])}{named(event['text'], self._names)}", is_alarm
+        # A status has recent events only; so many are enough to know them by.
+        while len(self._known) > 1024:
+            del self._known[next(iter(self._known))]
 
 
 def _at(time_s: float | None) -> str:

@@ -190,7 +190,7 @@ def checked_plan(args: argparse.Namespace, wrong: Mapping[str, str]) -> Plan:
     is_udp = args.listen != "-"
     source = {
         "kind": "udp" if is_udp else "lines",
-        "address": args.listen if is_udp else "",
+        "address": args.listen if is_udp else None,
         "senders": [one for named in args.allow for one in named] if args.allow else None,
         "layout": layout.to_dict(),
         "fill_samples": 5 if args.fill is None else args.fill,
@@ -245,6 +245,10 @@ def _monitor(args: argparse.Namespace, n_actuators: int, mistakes: list[str]) ->
                             f"found {update:g}")  # fmt: skip
         if window * rate < 8:
             mistakes.append(f"--window: expected at least 8 samples, found {window:g} s, {window * rate:.3g} samples")
+        if args.fill is not None and args.fill > window * rate:
+            mistakes.append(
+                f"--fill: expected at most the {window * rate:.0f} samples of the window, found {args.fill}"
+            )
         size = n_actuators * window * rate / p * _STATE_BYTES
         if size > (most := _most_bytes()):
             mistakes.append(
@@ -333,19 +337,19 @@ def _outputs(args: argparse.Namespace, mistakes: list[str]) -> dict[str, Any]:
         if args.log.name:
             files["--log, its readings"] = readings_path(args.log)
     for option, path in files.items():
-        mistakes += [f"{option}: {path}: {message}" for message in _not_writable(path)]
-    if found["readings_file"] is not None and args.log is not None and Path(found["readings_file"]) in files.values():
-        same = [o for o, p in files.items() if p == Path(found["readings_file"])]
-        if len(same) > 1:
-            mistakes.append(f"{' and '.join(same)} name the same file")
+        # Lines are written behind what a file holds; a log begins with its schema.
+        problems = _not_writable(path, may_hold_something=option == "--readings")
+        mistakes += [f"{option}: {path}: {message}" for message in problems]
+    logs = [option for option, path in files.items() if path == files.get("--readings") and option != "--readings"]
+    mistakes += [f"--readings and {option} name the same file, {files[option]}" for option in logs]
     return found
 
 
-def _not_writable(path: Path) -> Iterator[str]:
+def _not_writable(path: Path, *, may_hold_something: bool) -> Iterator[str]:
     try:
         if path.is_dir():
             yield "is a directory; expected the name of a file"
-        elif path.is_file() and path.stat().st_size:
+        elif path.is_file() and path.stat().st_size and not may_hold_something:
             yield "is there already and holds something: nothing is overwritten; choose another name"
         elif not path.parent.is_dir():
             yield f"there is no directory {path.parent}"

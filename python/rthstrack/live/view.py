@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import os
+import re
 import select
 import sys
 from collections import deque
@@ -25,8 +26,6 @@ if TYPE_CHECKING:
 # What happened last: so many lines of it.
 _EVENTS = 6
 _TOTALS = ("received", "lost", "repeated", "reordered", "malformed", "refused", "filled", "restarts")
-# Places in a reading's row.
-_ACTUATOR, _A, _D, _F, _A_LOW, _A_HIGH, _D_LOW, _D_HIGH, _VALID, _REASON = 3, 4, 5, 7, 8, 9, 10, 11, 12, 13
 
 
 class View:
@@ -70,20 +69,22 @@ def shown(
 ) -> Group:
     """The whole view of a status, as rich draws it."""
     parts: list[Any] = [Text(about, style="bold"), _actuators(status, names), Text(""), *_health(status)]
-    alarms = [alarm for alarm in status["alarms"] if alarm["active"] or alarm["latched"]]
-    parts += [Text(f"ALARM {alarm_text(alarm, names)}", style="bold red") for alarm in alarms]
+    for alarm in status["alarms"]:
+        if alarm["active"] or alarm["latched"]:
+            over = "" if alarm["active"] else " (over, held until it is reset)"
+            parts.append(Text(f"ALARM {named(alarm['text'], names)}{over}", style="bold red"))
     parts += [Text(line, style="dim") for line in events]
     if with_keys:
         parts.append(Text("r resets alarms, q quits", style="dim"))
     return Group(*parts)
 
 
-def alarm_text(alarm: Mapping[str, Any], names: Sequence[str]) -> str:
-    """An alarm in a line: whose it is, what it says, and whether it is over."""
-    actuator = alarm["actuator"]
-    which = f"{names[actuator]}: " if isinstance(actuator, int) and actuator < len(names) else ""
-    over = " (over, not yet reset)" if not alarm["active"] else ""
-    return f"{which}{alarm['text']}{over}"
+def named(text: str, names: Sequence[str]) -> str:
+    """A text of the monitor with an actuator called by its name."""
+    found = re.search(r"\bactuator (\d+):", text)
+    if found is None or int(found[1]) >= len(names):
+        return text
+    return f"{text[: found.start()]}{names[int(found[1])]}:{text[found.end() :]}"
 
 
 def _actuators(status: Mapping[str, Any], names: Sequence[str]) -> Table:
@@ -92,27 +93,34 @@ def _actuators(status: Mapping[str, Any], names: Sequence[str]) -> Table:
     for head in ("A", "d (95 % interval)", "at Hz"):
         table.add_column(head, justify="right", no_wrap=True)
     table.add_column("")
-    latest = {row[_ACTUATOR]: row for row in status["readings"]}
     raised = {alarm["actuator"] for alarm in status["alarms"] if alarm["active"] or alarm["latched"]}
+    latest = {reading["actuator"]: reading for reading in status["readings"] if reading is not None}
     for actuator, name in enumerate(names):
         style = "bold red" if actuator in raised else ""
-        row = latest.get(actuator)
-        if row is None:
-            table.add_row(Text(name, style=style), "-", "-", "-", Text("no reading yet", style="dim"))
-            continue
-        number = [math.nan if value is None else float(value) for value in row[_A:_VALID]]
-        a, d, f, a_low, a_high, d_low, d_high = (number[i - _A] for i in (_A, _D, _F, _A_LOW, _A_HIGH, _D_LOW, _D_HIGH))
-        said = Text("valid", style="green") if row[_VALID] else Text(row[_REASON] or "not valid", style="yellow")
-        if row[_VALID] and row[_REASON]:
-            said.append(f": {row[_REASON]}", style="dim")
-        table.add_row(
-            Text(name, style=style),
-            Text(with_interval(a, (a_low, a_high)), style=style),
-            Text(with_interval(1e3 * d, (1e3 * d_low, 1e3 * d_high), "ms"), style=style),
-            f"{f:.4g}" if math.isfinite(f) else "-",
-            said,
-        )
+        if actuator in latest:
+            cells = _reading(latest[actuator], style)
+        else:
+            cells = ["-", "-", "-", Text("no reading yet", style="dim")]
+        table.add_row(Text(name, style=style), *cells)
     return table
+
+
+def _reading(reading: Mapping[str, Any], style: str) -> list[str | Text]:
+    def number(name: str, factor: float = 1.0) -> float:
+        return math.nan if reading[name] is None else factor * float(reading[name])
+
+    def interval(name: str, factor: float = 1.0) -> tuple[float, float]:
+        low, high = reading[name] or (math.nan, math.nan)
+        return factor * low, factor * high
+
+    amplitude = with_interval(number("amplitude"), interval("amplitude_interval"))
+    delay = with_interval(number("delay_s", 1e3), interval("delay_interval_s", 1e3), "ms")
+    frequency = number("equivalent_frequency_hz")
+    said = Text("valid", style="green") if reading["valid"] else Text(reading["reason"] or "not valid", style="yellow")
+    if reading["valid"] and reading["reason"]:
+        said.append(f": {reading['reason']}", style="dim")
+    at = f"{frequency:.4g}" if math.isfinite(frequency) else "-"
+    return [Text(amplitude, style=style), Text(delay, style=style), at, said]
 
 
 def _health(status: Mapping[str, Any]) -> list[Text]:
