@@ -497,7 +497,7 @@ def test_a_page_is_served_at_the_address_that_is_told(capsys: pytest.CaptureFixt
     assert fake.made.outputs["page"] is True
 
 
-# With the compiled part ------------------------------------------------------------------------------------------------
+# With the compiled part -----------------------------------------------------------------------------------------------
 
 compiled = pytest.mark.skipif(not hasattr(_core, "Live"), reason="this build has no rthstrack._core.Live")
 RATE_HZ, GAIN, DELAY_S = 512.0, 1.05, 0.012
