@@ -16,8 +16,6 @@ from rich.live import Live as Screen
 from rich.table import Table
 from rich.text import Text
 
-from rthstrack.display import with_interval
-
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from types import TracebackType
@@ -90,7 +88,7 @@ def named(text: str, names: Sequence[str]) -> str:
 def _actuators(status: Mapping[str, Any], names: Sequence[str]) -> Table:
     table = Table(box=None, pad_edge=False)
     table.add_column("")
-    for head in ("A", "d (95 % interval)", "at Hz"):
+    for head in ("A (95 % interval)", "d in ms (95 % interval)", "at Hz"):
         table.add_column(head, justify="right", no_wrap=True)
     table.add_column("")
     raised = {alarm["actuator"] for alarm in status["alarms"] if alarm["active"] or alarm["latched"]}
@@ -106,21 +104,27 @@ def _actuators(status: Mapping[str, Any], names: Sequence[str]) -> Table:
 
 
 def _reading(reading: Mapping[str, Any], style: str) -> list[str | Text]:
-    def number(name: str, factor: float = 1.0) -> float:
-        return math.nan if reading[name] is None else factor * float(reading[name])
+    def number(name: str) -> float:
+        return math.nan if reading[name] is None else float(reading[name])
 
-    def interval(name: str, factor: float = 1.0) -> tuple[float, float]:
-        low, high = reading[name] or (math.nan, math.nan)
-        return factor * low, factor * high
-
-    amplitude = with_interval(number("amplitude"), interval("amplitude_interval"))
-    delay = with_interval(number("delay_s", 1e3), interval("delay_interval_s", 1e3), "ms")
+    amplitude = _with_interval(number("amplitude"), reading["amplitude_interval"], 4)
+    delay = _with_interval(1e3 * number("delay_s"), reading["delay_interval_s"], 3, 1e3)
     frequency = number("equivalent_frequency_hz")
     said = Text("valid", style="green") if reading["valid"] else Text(reading["reason"] or "not valid", style="yellow")
     if reading["valid"] and reading["reason"]:
         said.append(f": {reading['reason']}", style="dim")
     at = f"{frequency:.4g}" if math.isfinite(frequency) else "-"
     return [Text(amplitude, style=style), Text(delay, style=style), at, said]
+
+
+def _with_interval(value: float, interval: Sequence[float] | None, places: int, factor: float = 1.0) -> str:
+    """Always as many digits: what stands still does not seem to move."""
+    if not math.isfinite(value):
+        return "-"
+    if interval is None:
+        return f"{value:.{places}f}"
+    low, high = (factor * end for end in interval)
+    return f"{value:.{places}f} ({low:.{places}f} to {high:.{places}f})"
 
 
 def _health(status: Mapping[str, Any]) -> list[Text]:
