@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from rthstrack._core import Live
     from rthstrack.live.log import Log
-    from rthstrack.live.view import View
 
 ALARM = 3
 _SUMMARY = ("received", "lost", "repeated", "reordered", "malformed", "readings", "alarms")
@@ -141,45 +140,45 @@ def _page(live: Live, port: int, host: str) -> Any:
 
 
 def _watch(args: argparse.Namespace, plan: Plan, live: Live, ended: Ended, about: str) -> None:
-    """Shows what happens until the run ends."""
+    """Shows what happens until the run ends, and ends it."""
     news = _News(plan.layout.names)
     stream = sys.stdout if sys.stdout.isatty() else sys.stderr
-    shown = args.view or (stream is sys.stdout and not args.quiet)
     end = time.monotonic() + (args.duration or float("inf"))
-    lines: list[str] = []
-    with contextlib.ExitStack() as cleanup:
-        view: View | None = None
-        if shown:
-            from rthstrack.live.view import View
+    viewed: list[str] = []
+    if args.view or (stream is sys.stdout and not args.quiet):
+        from rthstrack.live.view import View
 
-            view = cleanup.enter_context(View(stream, about, plan.layout.names))
-        while True:
-            over = live.wait(max(0.0, min(_PERIOD_S, end - time.monotonic())))
-            # Asked before the status, which then shows why.
-            over |= args.exit_on_alarm and live.alarmed()
-            status = json.loads(live.status())
-            fresh = list(news.of(status))
-            lines += [text for text, is_alarm in fresh if is_alarm]
-            if view is None:
-                for text, is_alarm in fresh:
-                    if is_alarm or not args.quiet:
-                        say(text)
-            else:
+        with View(stream, about, plan.layout.names) as view:
+            for status in _statuses(args, live, ended, end):
+                fresh = list(news.of(status))
+                viewed += [text for text, is_alarm in fresh if is_alarm]
                 try:
                     view.draw(status, [text for text, _ in fresh])
                 except OSError:
                     # The terminal is gone, the test is not.
-                    cleanup.close()
-                    view = None
-            pressed = "" if view is None else view.keys()
-            if "r" in pressed:
-                live.reset()
-            if over or ended.asked or "q" in pressed or time.monotonic() >= end:
-                break
-    if shown:
-        # The view is gone, and with it what it said.
-        for line in lines:
-            say(line)
+                    break
+                pressed = view.keys()
+                if "r" in pressed:
+                    live.reset()
+                ended.asked |= "q" in pressed
+    # The view is gone, and with it what it said.
+    for line in viewed:
+        say(line)
+    for status in _statuses(args, live, ended, end):
+        for text, is_alarm in news.of(status):
+            if is_alarm or not args.quiet:
+                say(text)
+
+
+def _statuses(args: argparse.Namespace, live: Live, ended: Ended, end: float) -> Iterator[dict[str, Any]]:
+    """How all stands, ten times a second until the run ends, and once more when it has been ended."""
+    over = False
+    while not over:
+        over = live.wait(max(0.0, min(_PERIOD_S, end - time.monotonic()))) or time.monotonic() >= end
+        over |= ended.asked or (args.exit_on_alarm and live.alarmed())
+        yield json.loads(live.status())
+    live.stop()
+    yield json.loads(live.status())
 
 
 class _News:
