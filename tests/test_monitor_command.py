@@ -63,7 +63,7 @@ def test_all_mistakes_are_told_at_once_a_line_each_and_nothing_is_started(
         "--readings", tmp_path / "no" / "r.jsonl", "--readings", "udp://127.0.0.1:0", "--control", "70000",
     )  # fmt: skip
     assert (status, out) == (2, "")
-    assert not hasattr(fake, "made")
+    assert "made" not in vars(fake)
     assert all(line.startswith("rthstrack: ") for line in err)
     wanted = [
         "--listen: expected udp://HOST:PORT", "--rate is missing", "counter: expected one of", "byte_ordr: no such key",
