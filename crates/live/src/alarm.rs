@@ -381,7 +381,8 @@ pub(crate) mod tests {
 
     #[test]
     fn a_latched_alarm_is_held_until_reset() {
-        let (changes, mut alarms) = delays(AlarmConfig::default(), &[(1.0, 0.02), (2.0, 0.001), (3.0, 0.02), (4.0, 0.001)]);
+        let (changes, mut alarms) =
+            delays(AlarmConfig::default(), &[(1.0, 0.02), (2.0, 0.001), (3.0, 0.02), (4.0, 0.001)]);
         assert_eq!(changes, [(1.0, true)]);
         assert!(alarms.all()[0].latched && !alarms.all()[0].active);
         let mut ended = Vec::new();
@@ -428,8 +429,7 @@ pub(crate) mod tests {
 
     #[test]
     fn the_set_of_raised_alarms_is_that_of_the_actuator_and_the_stream() {
-        let config =
-            AlarmConfig { limit_amplitude: Some(0.1), limit_lost: Some(3), ..AlarmConfig::default() };
+        let config = AlarmConfig { limit_amplitude: Some(0.1), limit_lost: Some(3), ..AlarmConfig::default() };
         let mut alarms = Alarms::new(config, 2);
         alarms.read(&reading(1, 1.0, 1.2, 0.0), |_| ());
         alarms.count(1.0, 4, |_| ());

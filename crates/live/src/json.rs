@@ -265,7 +265,10 @@ mod tests {
         assert_eq!(value["reason"], Value::Null);
         let row: Value = serde_json::from_str(&made(|o| reading_row(o, &one))).unwrap();
         assert_eq!(row.as_array().unwrap().len(), 14);
-        assert_eq!((&row[3], &row[4], &row[5], &row[12]), (&value["actuator"], &value["amplitude"], &value["delay_s"], &value["valid"]));
+        assert_eq!(
+            (&row[3], &row[4], &row[5], &row[12]),
+            (&value["actuator"], &value["amplitude"], &value["delay_s"], &value["valid"])
+        );
     }
 
     #[test]

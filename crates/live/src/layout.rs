@@ -257,6 +257,15 @@ impl Layout {
         (body > 0 && body.is_multiple_of(self.config.sample_bytes)).then(|| body / self.config.sample_bytes)
     }
 
+    /// The lengths of datagrams that are taken, in words.
+    pub fn expected(&self) -> String {
+        let LayoutConfig { header_bytes, sample_bytes, .. } = self.config;
+        match header_bytes {
+            0 => format!("{sample_bytes} bytes a sample"),
+            _ => format!("a header of {header_bytes} bytes and {sample_bytes} bytes a sample"),
+        }
+    }
+
     /// Sample `i` of a datagram that has more than `i`. The counter is `Some(0)` where there is none, `None` where it is no count.
     pub fn decode(&self, datagram: &[u8], i: usize, target: &mut [f64], measured: &mut [f64]) -> Option<i64> {
         let LayoutConfig { header_bytes, sample_bytes, byte_order, .. } = self.config;

@@ -372,7 +372,11 @@ mod tests {
         let mut parser = LineParser::new(named()).unwrap();
         assert_eq!(read(&mut parser, "y, \"n\", x").0, Line::Nothing);
         assert_eq!(read(&mut parser, "2.5, 7, 1.5"), (Line::Sample(Some(7)), vec![1.5], vec![2.5]));
-        assert_eq!(read(&mut parser, "y, \"n\", x").0, Line::Nothing, "the header again, of a sender that started again");
+        assert_eq!(
+            read(&mut parser, "y, \"n\", x").0,
+            Line::Nothing,
+            "the header again, of a sender that started again"
+        );
     }
 
     #[test]
