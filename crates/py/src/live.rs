@@ -72,8 +72,7 @@ impl Live {
         alarms: &Bound<'_, PyDict>,
         outputs: &Bound<'_, PyDict>,
     ) -> PyResult<Self> {
-        let [monitor, source, alarms, outputs] =
-            [value(monitor)?, value(source)?, value(alarms)?, value(outputs)?];
+        let [monitor, source, alarms, outputs] = [value(monitor)?, value(source)?, value(alarms)?, value(outputs)?];
         let opened = py.detach(|| {
             let config = LiveConfig::read(&monitor, &source, &alarms, &outputs).map_err(LiveError::Settings)?;
             rthstrack_live::Live::new(config)
