@@ -134,6 +134,47 @@ def estimator_table(times: dict[str, list[float]]) -> list[str]:
     ]
 
 
+def monitor_table(found: dict[str, Any]) -> list[str]:
+    """Markdown lines of what a sample of a running test costs."""
+    of_five, alone = (found["empty_loop_ns"][name] for name in ("least_of_five", "one_run"))
+    lines = [
+        "## On-line",
+        "",
+        "`Monitor::step` at 1024 Hz, 0 to 32 Hz, 64 readings a second; nanoseconds. Mean: of a sample and actuator,"
+        " median of five runs. Steps: of all actuators together, each the least of five runs over the same stream of"
+        " 10^6 samples (fewer with several actuators or P = 1), because a shared machine interrupts any loop: an empty"
+        f" one took {of_five[0]}, {of_five[1]}, {of_five[2]} and {of_five[3]} ns (p50, p99, p99.99, largest) as the"
+        f" least of five, {alone[0]}, {alone[1]}, {alone[2]} and {alone[3]} ns in one run.",
+        "",
+        "| estimator | window, s | actuators | P | mean | p50 | p99 | p99.99 | largest | state, KiB an actuator |",
+        "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
+    ]
+    for c in found["cases"]:
+        steps = " | ".join(str(c[f"{name}_ns"]) for name in ("p50", "p99", "p9999", "max"))
+        size = c["state_bytes"] / c["n_actuators"] / 1024
+        lines.append(
+            f"| {c['estimator']} | {c['window_s']} | {c['n_actuators']} | {c['P']} | {c['mean_ns']:.0f} |"
+            f" {steps} | {size:.1f} |"
+        )
+    return [*lines, ""]
+
+
+def monitor_figures(found: dict[str, Any]) -> list[tuple[str, str, str, bool]]:
+    """The figures asked for of a 4 s window and one actuator."""
+    figures = []
+    for name, most in (("fei", 200), ("least_squares", 600)):
+        case = next(
+            c for c in found["cases"] if (c["estimator"], c["window_s"], c["n_actuators"], c["P"]) == (name, 4, 1, 8)
+        )
+        what = f"on-line, `{name}`, 4 s, one actuator:"
+        mean, worst, size = case["mean_ns"], case["max_ns"] / 1000, case["state_bytes"] / 1024
+        figures.append((f"{what} mean, ns a sample", f"<= {most}", f"{mean:.0f}", mean <= most))
+        figures.append((f"{what} worst step, us", "<= 20", f"{worst:.1f}", worst <= 20))
+        if name == "fei":
+            figures.append((f"{what} state, KiB", "<= 64", f"{size:.1f}", size <= 64))
+    return figures
+
+
 def machine() -> str:
     """Processor, cores and versions."""
     model = platform.processor() or platform.machine()
@@ -175,6 +216,7 @@ def main() -> int:
             )
         python_turns.append(row)
     found, python = median_of(rust_turns), median_of(python_turns)
+    online = rust_bench("monitor")
     small = pair(64)
     core = rthstrack.Evaluator(64, RATE_HZ)._plan
     call_us, bare_us = medians_us([lambda: rthstrack.evaluate(*small, RATE_HZ), lambda: core.evaluate(*small)], 2000)
@@ -272,6 +314,8 @@ def main() -> int:
     ):
         value = step_ns[name]
         figures.append((what, f"<= {most:g}" if most else "", f"{value:.0f}", most is None or value <= most))
+    lines += monitor_table(online)
+    figures += monitor_figures(online)
     gain = suite_s[1] / suite_s[2]
     figures.append(
         (

@@ -18,6 +18,7 @@ from rthstrack.errors import (
 )
 from rthstrack.factors import FactorChanges, Factors, KeyFrequencies, choose_factors, key_frequencies
 from rthstrack.ground_motion import GroundMotion, list_records, read_ground_motion, record, synthetic_ground_motion
+from rthstrack.monitor import Monitor, MonitorSettings, Readings, causal_decimate
 from rthstrack.recording import Channel, Recording, propose_pair, read_recording
 from rthstrack.report import write_report
 from rthstrack.studies import Study, study
@@ -66,7 +67,10 @@ __all__ = [
     "Indices",
     "KeyFrequencies",
     "Limits",
+    "Monitor",
+    "MonitorSettings",
     "MovingTracking",
+    "Readings",
     "Recording",
     "RecordingError",
     "RthstrackError",
@@ -80,6 +84,7 @@ __all__ = [
     "VirtualTest",
     "__version__",
     "assess",
+    "causal_decimate",
     "choose_factors",
     "critical_delay",
     "delay_damping",

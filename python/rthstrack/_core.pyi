@@ -6,13 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rthstrack import virtual_test
+from rthstrack.monitor import MonitorSettings
 from rthstrack.tracking import Settings
 
 __all__ = [
     "Evaluator",
     "KeyFrequencies",
+    "Monitor",
     "VirtualTest",
     "__version__",
+    "causal_decimate",
     "check_test",
     "choose_factors",
     "evaluate_moving",
@@ -50,6 +53,30 @@ class Evaluator:
     def evaluate_with_spectra(
         self, target: NDArray[Any], measured: NDArray[Any]
     ) -> list[tuple[_Numbers, _Spectra]]: ...
+
+_Columns = tuple[
+    tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]],
+    tuple[_Array, _Array, _Array, _Array, _Array, _Array],
+    tuple[_Array, _Array, list[str]],
+]
+
+@final
+class Monitor:
+    def __new__(cls, settings: MonitorSettings) -> Monitor: ...
+    @property
+    def update_hz(self) -> float: ...
+    @property
+    def latency_s(self) -> float: ...
+    @property
+    def age_s(self) -> float: ...
+    @property
+    def evaluated_rate_hz(self) -> float: ...
+    @property
+    def samples_until_reading(self) -> int: ...
+    def process(self, target: _Array, measured: _Array) -> _Columns: ...
+    def restart(self, index: int) -> None: ...
+
+def causal_decimate(samples: _Array, data_decimation: int) -> tuple[_Array, int]: ...
 
 _Whole = NDArray[np.uint64]
 _Changes = tuple[_Whole, _Whole, _Whole, _Array, _Array]

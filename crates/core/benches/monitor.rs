@@ -140,7 +140,7 @@ fn main() {
         }
         cases.push(Case { estimator, window_s: 4.0, n_actuators: 1, data_decimation: 1, n_samples: n / 4 });
     }
-    let mut of_five = percentiles(least_times(n, || {
+    let of_five = percentiles(least_times(n, || {
         Box::new(|i| {
             black_box(i);
         })
@@ -153,7 +153,6 @@ fn main() {
         *time = start.elapsed().as_nanos() as u32;
     }
     let cases: Vec<String> = cases.iter().map(measure).collect();
-    of_five.sort_unstable();
     println!(
         "{{\"empty_loop_ns\": {{\"least_of_five\": {of_five:?}, \"one_run\": {:?}}},\n \"cases\": [\n  {}\n ]}}",
         percentiles(alone),

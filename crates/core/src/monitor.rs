@@ -30,8 +30,8 @@ pub struct MonitorConfig {
     pub window_s: f64,
     /// Readings a second.
     pub update_hz: f64,
-    /// Lowest and highest frequency kept, both included, in hertz. Where none is given and P is above 1, `fei` keeps up to rate / (4 P), and the
-    /// other estimators what the decimator passes.
+    /// Lowest and highest frequency kept, both included, in hertz. With P above 1 the highest is rate / (4 P) at most, and that where
+    /// none is given; least squares leaves an upper end of just this, with a lower end of 0, to the decimator's slope.
     pub band_hz: Option<(f64, f64)>,
     /// Window over the samples.
     pub window: Window,
@@ -90,6 +90,10 @@ pub struct Reading {
 }
 
 impl Reading {
+    /// A place for a reading, which says nothing yet.
+    pub const EMPTY: Self =
+        Self { index: 0, time_s: 0.0, centre_s: 0.0, actuator: 0, tracking: Tracking::undetermined(Reason::Still) };
+
     /// Whether there are numbers.
     pub fn is_valid(&self) -> bool {
         !self.tracking.reason.is_some_and(|r| r.is_undetermined())
@@ -242,13 +246,7 @@ impl Monitor {
             target: ring(),
             measured: ring(),
         };
-        let reading = |actuator| Reading {
-            index: 0,
-            time_s: 0.0,
-            centre_s: 0.0,
-            actuator,
-            tracking: Tracking::undetermined(Reason::Still),
-        };
+        let reading = |actuator| Reading { actuator, ..Reading::EMPTY };
         MonitorState {
             actuators: (0..self.config.n_actuators).map(|_| actuator()).collect(),
             evaluator: self.evaluator.state(),
@@ -379,8 +377,16 @@ impl MonitorConfig {
             let expected = format!("at most {kept_hz} Hz at its upper end, rate / (4 P); lower P");
             return Err(Error::Setting { name: "band_hz", expected, found: high_hz.max(low_hz) });
         }
-        // Sums over samples have no upper end: they take what the decimator passes.
-        let open = decimated && self.estimator == Estimator::Fei;
+        let band_hz = match (self.estimator, self.band_hz) {
+            (Estimator::Fei | Estimator::Aligned, None) if decimated => Some((0.0, kept_hz)),
+            // What the decimator cuts off needs no bins to be cut off again: sums over samples are cheaper.
+            (Estimator::LeastSquares, Some((low_hz, high_hz)))
+                if decimated && low_hz == 0.0 && high_hz >= kept_hz * (1.0 - 1e-9) =>
+            {
+                None
+            }
+            (_, band_hz) => band_hz,
+        };
         Ok(EvaluatorConfig {
             estimator: self.estimator,
             data_decimation: 1,
@@ -388,7 +394,7 @@ impl MonitorConfig {
             decimator: Decimator::Spectral,
             window: self.window,
             detrend: self.detrend,
-            band_hz: self.band_hz.or(open.then_some((0.0, kept_hz))),
+            band_hz,
             max_delay_s: self.max_delay_s,
             ..EvaluatorConfig::default()
         })

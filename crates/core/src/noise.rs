@@ -5,7 +5,7 @@
 //! periodogram is flat enough to be averaged over wide blocks of bins, each corrected for what the fit has taken out of it.
 
 use crate::quantile::student_t_975;
-use crate::spectrum::{Bins, Sink};
+use crate::spectrum::{Bins, LANES, Sink};
 use crate::sums;
 use num_complex::Complex;
 
@@ -87,6 +87,22 @@ pub(crate) struct Influence {
     pub(crate) leverage: [f64; 3],
 }
 
+impl Influence {
+    fn forms(&self) -> Forms {
+        let square = |[a, b]: [f64; 2]| [a * a, 2.0 * a * b, b * b];
+        let [a, b, c] = self.leverage;
+        Forms { gain: square(self.gain), delay: square(self.delay), leverage: [a, 2.0 * b, c] }
+    }
+}
+
+/// The same as factors of y^2, y y' and y'^2.
+#[derive(Debug, Clone, Copy)]
+struct Forms {
+    gain: [f64; 3],
+    delay: [f64; 3],
+    leverage: [f64; 3],
+}
+
 /// What the bins are to the samples.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sampling {
@@ -98,20 +114,24 @@ pub(crate) struct Sampling {
     pub(crate) scale: f64,
 }
 
-/// Sums over a few neighbouring bins.
+/// Sums over a few neighbouring bins, in lanes.
 #[derive(Debug, Clone, Copy, Default)]
 struct Cell {
     n: f64,
     /// |U|^2 / |A|^2 of gain and delay.
-    gain: f64,
-    delay: f64,
-    leverage: f64,
-    target: f64,
+    gain: [f64; LANES],
+    delay: [f64; LANES],
+    leverage: [f64; LANES],
+    target: [f64; LANES],
     /// |E|^2 |A|^2
-    whitened: f64,
-    residual: f64,
-    cross_re: f64,
-    cross_im: f64,
+    whitened: [f64; LANES],
+    residual: [f64; LANES],
+    cross_re: [f64; LANES],
+    cross_im: [f64; LANES],
+}
+
+fn total(lanes: &[f64; LANES]) -> f64 {
+    lanes.iter().sum()
 }
 
 /// Standard deviations, and how far to go to either side of an estimate.
@@ -136,7 +156,10 @@ pub(crate) struct Spread<'a> {
     cosines: &'a [f64],
     correction: Option<&'a [f64]>,
     whitening: [f64; MAX_ORDER + 1],
+    /// The noise is not white.
+    coloured: bool,
     influence: Influence,
+    forms: Forms,
     sampling: Sampling,
     noisy_target: Option<NoisyTarget<'a>>,
     /// Whether the pair is (y, y') or (y, residual).
@@ -190,7 +213,9 @@ impl<'a> Spread<'a> {
             cosines,
             correction,
             whitening: noise.response(),
+            coloured: noise.order > 0,
             influence,
+            forms: influence.forms(),
             sampling,
             noisy_target,
             residual: false,
@@ -210,14 +235,14 @@ impl<'a> Spread<'a> {
         let cell = &mut self.cells[0];
         cell.n += 0.5;
         let (g, d) = (gain[0] * y + gain[1] * velocity, delay[0] * y + delay[1] * velocity);
-        cell.gain += 0.5 * g * g / whitening;
-        cell.delay += 0.5 * d * d / whitening;
-        cell.leverage +=
+        cell.gain[0] += 0.5 * g * g / whitening;
+        cell.delay[0] += 0.5 * d * d / whitening;
+        cell.leverage[0] +=
             0.5 * (leverage[0] * y * y + 2.0 * leverage[1] * y * velocity + leverage[2] * velocity * velocity);
-        cell.target += 0.5 * y * y;
-        cell.whitened += 0.5 * residual * residual * whitening;
-        cell.residual += 0.5 * residual * residual;
-        cell.cross_re += 0.5 * residual * y;
+        cell.target[0] += 0.5 * y * y;
+        cell.whitened[0] += 0.5 * residual * residual * whitening;
+        cell.residual[0] += 0.5 * residual * residual;
+        cell.cross_re[0] += 0.5 * residual * y;
     }
 
     /// The precision, with the noise's spectrum taken from blocks of n^0.4 independent bins to either side; `None` where
@@ -238,12 +263,12 @@ impl<'a> Spread<'a> {
             let cells = &self.cells[b * cells_per_block..to];
             let sum = |of: fn(&Cell) -> f64| cells.iter().map(of).sum::<f64>();
             let n = sum(|c| c.n);
-            let expected = n * window_power - scale * sum(|c| c.leverage);
+            let expected = n * window_power - scale * sum(|c| total(&c.leverage));
             // A block of which the fit leaves less than a tenth of a bin says nothing of the noise.
-            let density = sum(|c| c.whitened) / expected.max(0.1 * window_power);
+            let density = sum(|c| total(&c.whitened)) / expected.max(0.1 * window_power);
             let pieces = (expected / window_power / bins_per_piece).max(0.1);
-            gain.add(scale * sum(|c| c.gain), density, pieces);
-            delay.add(scale * sum(|c| c.delay), density, pieces);
+            gain.add(scale * sum(|c| total(&c.gain)), density, pieces);
+            delay.add(scale * sum(|c| total(&c.delay)), density, pieces);
         }
         let (coherence, coherent) = self.coherence();
         Some(Precision {
@@ -258,15 +283,19 @@ impl<'a> Spread<'a> {
 
     /// Coherence of residual and target over the cells that together hold all but a thousandth of the target's energy.
     fn coherence(&self) -> (f64, bool) {
-        let total: f64 = self.cells.iter().map(|c| c.target).sum();
-        let least = 1e-3 * total / self.cells.len() as f64;
+        let all_of_target: f64 = self.cells.iter().map(|c| total(&c.target)).sum();
+        let least = 1e-3 * all_of_target / self.cells.len() as f64;
         let (mut explained, mut all, mut shares, mut n) = (0.0, 0.0, 0.0, 0.0_f64);
-        for c in self.cells.iter().filter(|c| c.target > least && c.residual > 0.0) {
-            let own = self.noisy_target.map_or(0.0, |n| n.share * c.residual);
-            let cross = Complex::new(c.cross_re + own, c.cross_im).norm_sqr() / c.target;
+        for c in self.cells.iter() {
+            let (target, residual) = (total(&c.target), total(&c.residual));
+            if target <= least || residual <= 0.0 {
+                continue;
+            }
+            let own = self.noisy_target.map_or(0.0, |n| n.share * residual);
+            let cross = Complex::new(total(&c.cross_re) + own, total(&c.cross_im)).norm_sqr() / target;
             explained += cross;
-            all += c.residual;
-            shares += cross / c.residual;
+            all += residual;
+            shares += cross / residual;
             n += 1.0;
         }
         if n == 0.0 || all <= 0.0 {
@@ -305,58 +334,54 @@ impl Sink for Spread<'_> {
     fn take<const W: usize>(&mut self, bins: &Bins<W>) {
         let at = bins.first - self.first;
         let mut whitening = [self.whitening[0]; W];
-        let mut squared = [1.0; W];
-        for i in 0..W {
+        if self.coloured {
+            let cosines: &[f64; W] = self.cosines[at..at + W].try_into().expect("W of them");
             // cos(l omega) by the recurrence of Chebyshev's polynomials.
-            let c = self.cosines[at + i];
-            let (mut before, mut now) = (1.0, c);
+            let (mut before, mut now) = ([1.0; W], *cosines);
             for l in 1..=MAX_ORDER {
-                whitening[i] += 2.0 * self.whitening[l] * now;
-                (before, now) = (now, 2.0 * c * now - before);
+                for i in 0..W {
+                    whitening[i] += 2.0 * self.whitening[l] * now[i];
+                    (before[i], now[i]) = (now[i], 2.0 * cosines[i] * now[i] - before[i]);
+                }
             }
             // A tone in the residual would make this zero.
-            whitening[i] = whitening[i].max(FLATTEST * self.whitening[0]);
-            if let Some(correction) = self.correction {
-                squared[i] = correction[at + i] * correction[at + i];
-            }
+            whitening = whitening.map(|w| w.max(FLATTEST * self.whitening[0]));
         }
-        let mut sum = Cell::default();
+        let mut squared = [1.0; W];
+        if let Some(correction) = self.correction {
+            squared = std::array::from_fn(|i| correction[at + i] * correction[at + i]);
+        }
+        let (yr, yi) = (&bins.target_re, &bins.target_im);
+        let (er, ei) = (&bins.measured_re, &bins.measured_im);
+        let cell = &mut self.cells[at / self.width];
         if self.residual {
             for i in 0..W {
-                let (yr, yi) = (bins.target_re[i], bins.target_im[i]);
-                let (er, ei) = (bins.measured_re[i], bins.measured_im[i]);
-                let energy = (er * er + ei * ei) * squared[i];
-                sum.residual += energy;
-                sum.whitened += energy * whitening[i];
-                sum.cross_re += (er * yr + ei * yi) * squared[i];
-                sum.cross_im += (ei * yr - er * yi) * squared[i];
+                let energy = (er[i] * er[i] + ei[i] * ei[i]) * squared[i];
+                cell.residual[i] += energy;
+                cell.whitened[i] += energy * whitening[i];
+                cell.cross_re[i] += (er[i] * yr[i] + ei[i] * yi[i]) * squared[i];
+                cell.cross_im[i] += (ei[i] * yr[i] - er[i] * yi[i]) * squared[i];
             }
-        } else {
-            let Influence { gain, delay, leverage } = self.influence;
-            for i in 0..W {
-                let (yr, yi) = (bins.target_re[i], bins.target_im[i]);
-                let (vr, vi) = (bins.measured_re[i], bins.measured_im[i]);
-                let (yy, yv, vv) = (yr * yr + yi * yi, yr * vr + yi * vi, vr * vr + vi * vi);
-                let form = |a: f64, b: f64, c: f64| (a * yy + 2.0 * b * yv + c * vv) * squared[i];
-                let weight = self.noisy_target.map_or(1.0, |n| n.weights[at + i]);
-                let noise = weight * weight / whitening[i];
-                sum.n += 1.0;
-                sum.gain += noise * form(gain[0] * gain[0], gain[0] * gain[1], gain[1] * gain[1]);
-                sum.delay += noise * form(delay[0] * delay[0], delay[0] * delay[1], delay[1] * delay[1]);
-                sum.leverage += weight * form(leverage[0], leverage[1], leverage[2]);
-                // What is not in the fit, for it is mostly noise, is not asked whether the residual follows it.
-                sum.target += if weight > 0.0 { yy * squared[i] } else { 0.0 };
-            }
+            return;
         }
-        let cell = &mut self.cells[at / self.width];
-        cell.n += sum.n;
-        cell.gain += sum.gain;
-        cell.delay += sum.delay;
-        cell.leverage += sum.leverage;
-        cell.target += sum.target;
-        cell.whitened += sum.whitened;
-        cell.residual += sum.residual;
-        cell.cross_re += sum.cross_re;
-        cell.cross_im += sum.cross_im;
+        let mut weight = [1.0; W];
+        if let Some(noisy_target) = self.noisy_target {
+            weight = std::array::from_fn(|i| noisy_target.weights[at + i]);
+        }
+        let Forms { gain, delay, leverage } = self.forms;
+        let (vr, vi) = (er, ei);
+        cell.n += W as f64;
+        for i in 0..W {
+            let yy = (yr[i] * yr[i] + yi[i] * yi[i]) * squared[i];
+            let yv = (yr[i] * vr[i] + yi[i] * vi[i]) * squared[i];
+            let vv = (vr[i] * vr[i] + vi[i] * vi[i]) * squared[i];
+            let form = |[a, b, c]: [f64; 3]| a * yy + b * yv + c * vv;
+            let noise = weight[i] * weight[i] / whitening[i];
+            cell.gain[i] += noise * form(gain);
+            cell.delay[i] += noise * form(delay);
+            cell.leverage[i] += weight[i] * form(leverage);
+            // What is not in the fit, for it is mostly noise, is not asked whether the residual follows it.
+            cell.target[i] += if weight[i] > 0.0 { yy } else { 0.0 };
+        }
     }
 }

@@ -291,6 +291,14 @@ impl Spectrum {
                             strip[..len].iter_mut().zip(x.iter().zip(w)).for_each(|(y, (x, w))| *y = w * x);
                         }
                     }
+                    (None, Some(line), _) if line.is_level() => {
+                        let level = line.at_f64(0.0);
+                        if added {
+                            strip[..len].iter_mut().zip(x).for_each(|(y, x)| *y += x - level);
+                        } else {
+                            strip[..len].iter_mut().zip(x).for_each(|(y, x)| *y = x - level);
+                        }
+                    }
                     (w, Some(line), _) => {
                         for i in 0..len {
                             let v = x[i] - line.at(at + i);
@@ -409,21 +417,28 @@ struct Unpack {
     coarse: Vec<Complex<f64>>,
     /// W^0 .. W^(LANES-1)
     fine: [Complex<f64>; LANES],
+    /// W^k of the bins in the middle that the groups leave, from the first of them on.
+    middle: Vec<Complex<f64>>,
 }
 
 impl Unpack {
     fn new(half: usize) -> Self {
         let twiddle = |k: usize| Complex::from_polar(1.0, -PI * k as f64 / half as f64);
         let groups = (half / 2).saturating_sub(1) / LANES;
-        Self { half, coarse: (0..groups).map(|g| twiddle(1 + g * LANES)).collect(), fine: std::array::from_fn(twiddle) }
+        let grouped = groups * LANES;
+        Self {
+            half,
+            coarse: (0..groups).map(|g| twiddle(1 + g * LANES)).collect(),
+            fine: std::array::from_fn(twiddle),
+            middle: (grouped + 1..half - grouped).map(twiddle).collect(),
+        }
     }
 
-    /// Bin `k` alone, 0 <= k <= H.
+    /// Bin `k` alone, 0 < k <= H, with its W^k.
     #[inline(always)]
-    fn bin(&self, z: &[Complex<f64>], k: usize) -> Complex<f64> {
+    fn bin(&self, z: &[Complex<f64>], k: usize, twiddle: Complex<f64>) -> Complex<f64> {
         let half = self.half;
-        let (a, b) = (z[k % half], z[(half - k) % half].conj());
-        let twiddle = Complex::from_polar(1.0, -PI * k as f64 / half as f64);
+        let (a, b) = (z[k % half], z[half - k].conj());
         let difference = a - b;
         (a + b) * 0.5 + twiddle * Complex::new(difference.im, -difference.re) * 0.5
     }
@@ -434,10 +449,11 @@ impl Unpack {
         target: &[Complex<f64>],
         measured: &[Complex<f64>],
         k: usize,
+        twiddle: Complex<f64>,
         sink: &mut S,
     ) {
-        let t = self.bin(target, k);
-        let m = if BOTH { self.bin(measured, k) } else { Complex::new(0.0, 0.0) };
+        let t = self.bin(target, k, twiddle);
+        let m = if BOTH { self.bin(measured, k, twiddle) } else { Complex::new(0.0, 0.0) };
         sink.take(&Bins::<1> {
             first: k,
             target_re: [t.re],
@@ -475,44 +491,49 @@ impl Unpack {
             let (t_low, t_high) = unpack_group(target, half, k, &twiddle);
             let zero = ([0.0; LANES], [0.0; LANES]);
             let (m_low, m_high) = if BOTH { unpack_group(measured, half, k, &twiddle) } else { (zero, zero) };
-            for (needed, base, (t_re, t_im), (m_re, m_im)) in
-                [(lower_needed, k, t_low, m_low), (upper_needed, upper, t_high, m_high)]
-            {
-                if !needed {
-                    continue;
-                }
-                if first <= base && base + LANES - 1 <= last {
-                    sink.take(&Bins::<LANES> {
-                        first: base,
-                        target_re: t_re,
-                        target_im: t_im,
-                        measured_re: m_re,
-                        measured_im: m_im,
-                    });
-                } else {
-                    for i in (0..LANES).filter(|i| kept(base + i)) {
-                        sink.take(&Bins::<1> {
-                            first: base + i,
-                            target_re: [t_re[i]],
-                            target_im: [t_im[i]],
-                            measured_re: [m_re[i]],
-                            measured_im: [m_im[i]],
-                        });
-                    }
-                }
+            if lower_needed {
+                hand_over(first, last, k, t_low, m_low, sink);
+            }
+            if upper_needed {
+                hand_over(first, last, upper, t_high, m_high, sink);
             }
         }
         // What the groups leave: the middle bins and the Nyquist bin (k = H).
         for k in first.max(grouped + 1)..(half - grouped).min(last + 1) {
-            self.single::<S, BOTH>(target, measured, k, sink);
+            self.single::<S, BOTH>(target, measured, k, self.middle[k - grouped - 1], sink);
         }
         if kept(half) {
-            self.single::<S, BOTH>(target, measured, half, sink);
+            self.single::<S, BOTH>(target, measured, half, Complex::new(-1.0, 0.0), sink);
         }
     }
 }
 
 type Lanes = ([f64; LANES], [f64; LANES]);
+
+/// Gives the bins from `base` on to `sink`, those that are kept.
+#[inline(always)]
+fn hand_over<S: Sink>(
+    first: usize,
+    last: usize,
+    base: usize,
+    (target_re, target_im): Lanes,
+    (measured_re, measured_im): Lanes,
+    sink: &mut S,
+) {
+    if first <= base && base + LANES - 1 <= last {
+        sink.take(&Bins::<LANES> { first: base, target_re, target_im, measured_re, measured_im });
+        return;
+    }
+    for i in (0..LANES).filter(|i| (first..=last).contains(&(base + i))) {
+        sink.take(&Bins::<1> {
+            first: base + i,
+            target_re: [target_re[i]],
+            target_im: [target_im[i]],
+            measured_re: [measured_re[i]],
+            measured_im: [measured_im[i]],
+        });
+    }
+}
 
 /// Bins k .. k + LANES and H - k - LANES + 1 ..= H - k of one packed transform.
 #[inline(always)]

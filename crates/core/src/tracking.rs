@@ -180,7 +180,7 @@ pub struct Tracking {
 
 impl Tracking {
     /// Nothing but the reason.
-    pub(crate) fn undetermined(reason: Reason) -> Self {
+    pub(crate) const fn undetermined(reason: Reason) -> Self {
         Self {
             fei: Complex::new(f64::NAN, f64::NAN),
             amplitude: f64::NAN,
@@ -558,7 +558,8 @@ impl Sums {
         let fei = cross / power;
         let equivalent_frequency_hz = moment / power * delta_f_hz;
         // A sensor that reports nothing is not in time: it has no phase.
-        let phase_rad = if self.cross_size() == 0.0 { f64::NAN } else { fei.im.atan2(fei.re) };
+        // And -0 of an antiphase is pi, not -pi.
+        let phase_rad = if self.cross_size() == 0.0 { f64::NAN } else { (fei.im + 0.0).atan2(fei.re) };
         Some(Tracking {
             fei,
             amplitude: fei.norm(),

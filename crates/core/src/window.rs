@@ -2,6 +2,8 @@
 
 use std::f64::consts::PI;
 
+use pulp::{Arch, NullaryFnOnce};
+
 use crate::sums;
 
 /// Window over the record, symmetric (first and last sample alike).
@@ -131,6 +133,31 @@ impl Line {
     #[inline(always)]
     pub fn at(&self, i: usize) -> f64 {
         self.at_f64(i as f64)
+    }
+
+    /// Whether it is a mean alone.
+    #[inline(always)]
+    pub(crate) fn is_level(&self) -> bool {
+        self.slope == 0.0
+    }
+
+    /// Subtracts it from `samples`, its first place at the first of them.
+    pub(crate) fn subtract_from(&self, samples: &mut [f64]) {
+        struct Subtract<'a>(Line, &'a mut [f64]);
+        impl NullaryFnOnce for Subtract<'_> {
+            type Output = ();
+
+            #[inline(always)]
+            fn call(self) {
+                let Self(line, samples) = self;
+                if line.is_level() {
+                    samples.iter_mut().for_each(|v| *v -= line.level);
+                } else {
+                    samples.iter_mut().enumerate().for_each(|(i, v)| *v -= line.at_f64(i as u32 as f64));
+                }
+            }
+        }
+        Arch::new().dispatch(Subtract(*self, samples));
     }
 
     /// Sum of its squares over `n` places, `step` apart, about the centre.

@@ -7,8 +7,8 @@ use rthstrack::dynamics::{
     Actuator, BoucWen, Compensation, Converter, Delay, Dynamics, Law, Motion, SampledActuator, ServoHydraulic,
 };
 use rthstrack::{
-    Decimator, Detrend, Estimator, Evaluator, EvaluatorConfig, KeyFrequencies, KeyFrequenciesConfig, Noise, Pair,
-    Window,
+    Decimator, Detrend, Estimator, Evaluator, EvaluatorConfig, KeyFrequencies, KeyFrequenciesConfig, Monitor,
+    MonitorConfig, Noise, Pair, Window,
 };
 
 thread_local! {
@@ -115,5 +115,49 @@ fn stepping_an_actuator_allocates_nothing() {
             assert!(motion.displacement.is_finite() && force.is_finite(), "{dynamics:?}");
         }
         assert_eq!(COUNT.with(Cell::get), before, "{dynamics:?}");
+    }
+}
+
+#[test]
+fn monitoring_allocates_nothing() {
+    for estimator in [Estimator::Fei, Estimator::LeastSquares, Estimator::Aligned] {
+        for (data_decimation, window, band_hz) in
+            [(1, Window::Boxcar, None), (8, Window::Boxcar, Some((0.0, 32.0))), (4, Window::Hann, Some((0.5, 30.0)))]
+        {
+            let config = MonitorConfig {
+                window_s: 1.0,
+                estimator,
+                data_decimation,
+                window,
+                band_hz,
+                minimum_amplitude: 1e-3,
+                n_actuators: 2,
+                ..Default::default()
+            };
+            let monitor = Monitor::new(config).unwrap();
+            let mut state = monitor.state();
+            let (mut readings, mut valid) = (0, 0);
+            let before = COUNT.with(Cell::get);
+            for i in 0..8192 {
+                let t = f64::from(i) / 1024.0;
+                let motion = |t: f64| (17.0 * t).sin() + 0.3 * (51.0 * t).cos();
+                // What goes wrong must not allocate either: gaps, infinities, a target that stands still, magnitudes.
+                let (x, y) = match i {
+                    2000 => (f64::NAN, f64::INFINITY),
+                    3500..4800 => (1.0, 2.0),
+                    5000 => (f64::MAX, -f64::MAX),
+                    _ => (motion(t), 0.9 * motion(t - 0.01)),
+                };
+                if let Some(found) = monitor.step(&mut state, &[x, 2.0 * x], &[y, 1e200 * y]) {
+                    readings += found.len();
+                    valid += found.iter().filter(|r| r.is_valid()).count();
+                }
+                if i == 6000 {
+                    monitor.restart(&mut state, 0);
+                }
+            }
+            assert_eq!(COUNT.with(Cell::get), before, "{config:?}");
+            assert!(valid > 0 && valid < readings, "{valid} of {readings}: {config:?}");
+        }
     }
 }

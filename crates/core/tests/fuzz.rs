@@ -1,7 +1,8 @@
-//! Any finite samples under any settings give a number, a reason or an error, and never a panic. `RTHSTRACK_FUZZ` sets how many.
+//! Any samples under any settings give a number, a reason or an error, and never a panic (overflow checks are on). `RTHSTRACK_FUZZ` sets how many.
 
 use rthstrack::{
-    Decimator, Detrend, Estimator, Evaluator, EvaluatorConfig, MovingConfig, Noise, Pair, Window, evaluate_moving,
+    Decimator, Detrend, Estimator, Evaluator, EvaluatorConfig, Monitor, MonitorConfig, MovingConfig, Noise, Pair,
+    Window, evaluate_moving,
 };
 
 /// A multiplicative congruential generator: the same cases on every machine.
@@ -109,4 +110,68 @@ fn any_finite_samples_are_answered() {
         let _ = evaluate_moving(&pair, &moving);
     }
     assert!(determined * 20 > answered, "{determined} of {answered} were determined");
+}
+
+#[test]
+fn a_monitor_takes_any_bits() {
+    let cases: u64 = std::env::var("RTHSTRACK_FUZZ").ok().and_then(|n| n.parse().ok()).unwrap_or(1500);
+    let (mut valid, mut all) = (0u64, 0u64);
+    for case in 0..cases {
+        let mut random = Random(case.wrapping_mul(0xd134_2543_de82_ef95) + 1);
+        let rate_hz = random.pick(&[50.0, 1024.0, 1e-300, 1e300]);
+        let n_actuators = random.pick(&[1, 1, 3]);
+        let low = random.uniform() * rate_hz / 40.0;
+        let config = MonitorConfig {
+            rate_hz,
+            window_s: random.pick(&[4.0, 37.0, 64.0, 200.0]) / rate_hz,
+            update_hz: rate_hz / random.pick(&[8.0, 8.0, 50.0]),
+            band_hz: random.pick(&[None, None, Some((0.0, rate_hz / 32.0)), Some((low, low + rate_hz / 64.0))]),
+            window: random.pick(&Window::NAMES).1,
+            detrend: random.pick(&Detrend::NAMES).1,
+            estimator: random.pick(&Estimator::NAMES).1,
+            data_decimation: random.pick(&[1, 1, 2, 8]),
+            frequency_decimation: random.pick(&[1, 1, 2]),
+            max_delay_s: random.pick(&[20.0, 3.0, 1000.0]) / rate_hz,
+            expected_delay_s: random.pick(&[None, Some(0.0), Some(-1e9)]),
+            minimum_amplitude: random.pick(&[0.0, 0.0, 0.5]),
+            n_actuators,
+        };
+        let Ok(monitor) = Monitor::new(config) else { continue };
+        let mut state = monitor.state();
+        let n = 400 * n_actuators;
+        let (mut target, mut measured) = (random.signal(n), random.signal(n));
+        if random.below(2) == 0 {
+            measured = (0..n).map(|i| 0.9 * target[i.saturating_sub(3 * n_actuators)] + 1e-3 * measured[i]).collect();
+        }
+        // Bits as they come (NaN with any payload, infinities, denormals, the largest numbers), more and more often.
+        let often = random.pick(&[0.0, 0.002, 0.05, 1.0]);
+        for v in target.iter_mut().chain(&mut measured) {
+            if random.uniform() < often {
+                let bits = (random.uniform() * 2f64.powi(53)) as u64;
+                *v = f64::from_bits(bits << 11 | bits >> 42);
+            }
+        }
+        for (x, y) in target.chunks(n_actuators).zip(measured.chunks(n_actuators)) {
+            // A slice that is too short is a gap, not a panic.
+            let short = random.below(200) == 0;
+            let Some(readings) = monitor.step(&mut state, if short { &x[1..] } else { x }, y) else { continue };
+            for reading in readings {
+                all += 1;
+                valid += u64::from(reading.is_valid());
+                let t = &reading.tracking;
+                if reading.is_valid() {
+                    assert!(
+                        t.amplitude.is_finite() && t.equivalent_frequency_hz.is_finite(),
+                        "case {case}: {reading:?}"
+                    );
+                } else {
+                    assert!(t.amplitude.is_nan() && t.delay_s.is_nan(), "case {case}: {reading:?}");
+                }
+            }
+            if random.below(500) == 0 {
+                monitor.restart(&mut state, u64::MAX - random.below(1000) as u64);
+            }
+        }
+    }
+    assert!(valid * 20 > all && valid < all, "{valid} of {all} were valid");
 }

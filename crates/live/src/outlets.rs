@@ -34,6 +34,10 @@ const BOARD_S: f64 = 10.0;
 /// Of items that come irregularly.
 const SPARE: usize = 1024;
 
+/// Longest queue of words, half a gibibyte, and of readings.
+const MAX_WORDS: usize = 1 << 26;
+const MAX_READINGS: usize = 1 << 20;
+
 /// Words before the numbers in a row of the log: index, counter, filled.
 pub(crate) const ROW_HEAD: usize = 3;
 
@@ -57,6 +61,17 @@ fn queue<T>(wanted: bool, capacity: usize) -> (Option<Producer<T>>, Option<Consu
     }
     let (producer, consumer) = RingBuffer::new(capacity);
     (Some(producer), Some(consumer))
+}
+
+/// The same of plain words, whose memory is taken now and not while samples come.
+fn words<T: Copy + Default>(wanted: bool, row: usize, rows: usize) -> (Option<Producer<T>>, Option<Consumer<T>>) {
+    let capacity = row * rows.min(MAX_WORDS / row);
+    let (mut producer, mut consumer) = queue(wanted, capacity);
+    if let (Some(producer), Some(consumer)) = (&mut producer, &mut consumer) {
+        while producer.push(T::default()).is_ok() {}
+        while consumer.pop().is_ok() {}
+    }
+    (producer, consumer)
 }
 
 /// A socket to one address that never waits.
@@ -114,14 +129,14 @@ impl Outlets {
     ) -> (Self, Ends) {
         let n = monitor.config().n_actuators;
         let depth = |seconds: f64, per_second: f64| (seconds * per_second).ceil() as usize + 1;
-        let n_readings = |seconds| n * depth(seconds, monitor.update_hz()) + SPARE;
+        let n_readings = |seconds| (n * depth(seconds, monitor.update_hz())).min(MAX_READINGS) + SPARE;
         let row = 1 + 2 * n;
-        let (samples, samples_end) = queue(wanted.log, (ROW_HEAD + 2 * n) * depth(LOG_S, monitor.config().rate_hz));
+        let (samples, samples_end) = words(wanted.log, ROW_HEAD + 2 * n, depth(LOG_S, monitor.config().rate_hz));
         let (judged, judged_end) = queue(wanted.log, n_readings(LOG_S));
         let (file, file_end) = queue(wanted.file, n_readings(LOG_S));
         // A reading may come with the standing of its alarms.
         let (items, items_end) = queue(true, 4 * n_readings(BOARD_S));
-        let (rows, rows_end) = queue(wanted.page, row * depth(BOARD_S, monitor.evaluated_rate_hz()));
+        let (rows, rows_end) = words(wanted.page, row, depth(BOARD_S, monitor.evaluated_rate_hz()));
         let queues = Queues { samples, judged, file, items, rows };
         let (words, row) = (vec![0; ROW_HEAD + 2 * n], vec![0.0; row]);
         let outlets = Self { shared, readings, alarms, queues, text: String::with_capacity(4096), words, row };

@@ -12,7 +12,7 @@ use crate::spectrum::{Spectra, windows};
 
 /// Samples a second of the scope that a picture needs.
 const SCOPE_HZ: f64 = 512.0;
-/// And how much of the past is sent to a new page.
+/// And how much of the past is sent to a new page, a window at least.
 const SCOPE_S: f64 = 10.0;
 const STATUS_EVENTS: usize = 20;
 
@@ -33,11 +33,12 @@ impl Page {
         board: Board,
         limits: &AlarmConfig,
         source: &str,
+        names: &[String],
     ) -> Self {
         Self {
             spectra: Mutex::new(Spectra::new(monitor.evaluator())),
             board: Mutex::new(board),
-            hello: hello(&monitor, limits, source),
+            hello: hello(&monitor, limits, source, names),
             stride: (monitor.evaluated_rate_hz() / SCOPE_HZ).ceil().max(1.0) as u64,
             shared,
             monitor,
@@ -133,7 +134,8 @@ impl Page {
 
     fn scope(&self, out: &mut String, board: &Board, since: u64) {
         let n = self.monitor.config().n_actuators;
-        let (rows, end_s) = board.scope.since(since, self.stride, SCOPE_S);
+        let most_s = SCOPE_S.max(self.monitor.config().window_s);
+        let (rows, end_s) = board.scope.since(since, self.stride, most_s);
         key(out, "scope");
         out.push('{');
         key(out, "rate_hz");
@@ -181,7 +183,7 @@ fn event(out: &mut String, event: &Event) {
     out.push('}');
 }
 
-fn hello(monitor: &Monitor, limits: &AlarmConfig, source: &str) -> String {
+fn hello(monitor: &Monitor, limits: &AlarmConfig, source: &str, names: &[String]) -> String {
     let config = monitor.config();
     let mut made = String::from("{");
     let out = &mut made;
@@ -206,7 +208,10 @@ fn hello(monitor: &Monitor, limits: &AlarmConfig, source: &str) -> String {
     key(out, "n_actuators");
     whole(out, config.n_actuators as u64);
     key(out, "names");
-    list(out, 0..config.n_actuators, |out, a| text(out, &format!("actuator {a}")));
+    list(out, 0..config.n_actuators, |out, a| match names.get(a) {
+        Some(name) => text(out, name),
+        None => text(out, &format!("actuator {a}")),
+    });
     key(out, "source");
     text(out, source);
     key(out, "limits");

@@ -45,6 +45,8 @@ pub enum Place {
 #[derive(Debug, Clone)]
 pub struct Sequence {
     bits: u32,
+    /// A negative counter has come.
+    signed: bool,
     fill_samples: u64,
     tally: Tally,
     /// The newest counter as it was sent, and unwrapped.
@@ -60,7 +62,7 @@ impl Sequence {
     /// A counter of `bits` bits; gaps of up to `fill_samples` are filled.
     pub fn new(bits: u32, fill_samples: u64) -> Self {
         let (oldest, seen, replay) = (0, [0; (MEMORY / 64) as usize], (0, 0));
-        Self { bits, fill_samples, tally: Tally::default(), newest: None, oldest, seen, replay }
+        Self { bits, signed: false, fill_samples, tally: Tally::default(), newest: None, oldest, seen, replay }
     }
 
     /// The totals so far.
@@ -77,6 +79,7 @@ impl Sequence {
     /// Where the sample `counter` belongs. After a pause (`paused`) a counter that is behind has started anew: nothing
     /// overtakes for that long.
     pub fn place(&mut self, counter: i64, paused: bool) -> Place {
+        self.signed |= counter < 0;
         let Some((sent, newest)) = self.newest else {
             self.begin(counter);
             return Place::Next;
@@ -107,14 +110,14 @@ impl Sequence {
         }
     }
 
-    /// The counter that lies `n` before `counter`.
+    /// The counter that lies `n` before `counter`, which has just been placed, and at most as far as the one placed before.
+    ///
+    /// A wrapping counter's type is not known to be signed: below zero lie the largest unsigned counters, unless there are
+    /// negative ones about.
     pub fn before(&self, counter: i64, n: u64) -> i64 {
         let earlier = counter.wrapping_sub(n as i64);
-        match self.bits {
-            // A wrapping counter's type is not known to be signed; a negative neighbour tells.
-            bits if bits < 64 && earlier < 0 && counter >= 0 => earlier + (1 << bits),
-            _ => earlier,
-        }
+        let lowest = if self.signed { -(1i64 << (self.bits.min(63) - 1)) } else { 0 };
+        if self.bits < 64 && earlier < lowest { earlier + (1 << self.bits) } else { earlier }
     }
 
     /// From `from` to `to` the shorter way round.
@@ -275,8 +278,10 @@ mod tests {
 
     #[test]
     fn counters_of_filled_samples_wrap_around_too() {
-        assert_eq!(Sequence::new(16, 3).before(1, 2), 65535);
-        assert_eq!(Sequence::new(16, 3).before(-32768, 1), -32769 + 65536 - 65536);
+        let mut sequence = Sequence::new(16, 3);
+        assert_eq!((sequence.before(1, 2), sequence.before(10, 2)), (65535, 8));
+        sequence.place(-2, false);
+        assert_eq!((sequence.before(1, 2), sequence.before(-32768, 1)), (-1, 32767));
         assert_eq!(Sequence::new(64, 3).before(10, 2), 8);
     }
 

@@ -46,6 +46,8 @@ pub struct OutputsConfig {
     pub log: bool,
     /// Keep what the page shows.
     pub page: bool,
+    /// What the page calls the actuators; empty for "actuator 0" and so on.
+    pub names: Vec<String>,
 }
 
 /// Everything that is needed for a run.
@@ -107,6 +109,14 @@ impl LiveConfig {
             found.push(format!("the layout has {n} actuators but n_actuators is {}", self.monitor.n_actuators));
         }
         found.extend(layout);
+        let names = &self.outputs.names;
+        if !names.is_empty() && names.len() != self.monitor.n_actuators {
+            found.push(format!(
+                "outputs.names must be {} names, one an actuator, not {}",
+                self.monitor.n_actuators,
+                names.len()
+            ));
+        }
         let window = (self.monitor.window_s * self.monitor.rate_hz).round();
         if window.is_finite() && self.fill_samples as f64 > window {
             found.push(format!(
@@ -257,6 +267,11 @@ fn read_outputs(keys: &mut Keys<'_>) -> OutputsConfig {
         control: keys.address("control"),
         log: keys.flag("log").unwrap_or(false),
         page: keys.flag("page").unwrap_or(false),
+        names: keys
+            .some("names", "a list of names, one an actuator", |value| {
+                value.as_array()?.iter().map(|name| name.as_str().map(str::to_owned)).collect()
+            })
+            .unwrap_or_default(),
     }
 }
 

@@ -8,11 +8,14 @@ use rthstrack_live::engine::{Engine, EngineConfig, Outlet, Sample, Totals};
 
 const RATE_HZ: f64 = 256.0;
 
+/// Index, counter, filled, target, measured.
+type Taken = (u64, i64, bool, Vec<f64>, Vec<f64>);
+
 /// Remembers everything.
 #[derive(Default)]
 struct Memory {
     readings: Vec<Reading>,
-    samples: Vec<(u64, i64, bool, Vec<f64>, Vec<f64>)>,
+    samples: Vec<Taken>,
     changes: Vec<Change>,
     events: Vec<(f64, String)>,
     evaluated: Vec<f64>,

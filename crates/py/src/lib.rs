@@ -8,6 +8,7 @@ mod factors;
 mod indices;
 mod key_frequencies;
 mod live;
+mod monitor;
 mod moving;
 mod pool;
 mod response;
@@ -20,6 +21,8 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     m.add_class::<tracking::Evaluator>()?;
     m.add_class::<key_frequencies::KeyFrequencies>()?;
+    m.add_class::<monitor::Monitor>()?;
+    m.add_function(wrap_pyfunction!(monitor::causal_decimate, m)?)?;
     m.add_function(wrap_pyfunction!(factors::choose_factors, m)?)?;
     m.add_function(wrap_pyfunction!(factors::prior_bounds, m)?)?;
     m.add_function(wrap_pyfunction!(moving::evaluate_moving, m)?)?;

@@ -570,7 +570,7 @@ impl Alignment {
     fn condition(&self, signal: &mut [f64], within: &Range<usize>) {
         let samples = &mut signal[within.clone()];
         if let Some(line) = self.detrend.line(samples) {
-            samples.iter_mut().enumerate().for_each(|(i, v)| *v -= line.at(i));
+            line.subtract_from(samples);
         }
         self.taper(samples, within);
     }
@@ -820,11 +820,17 @@ impl Alignment {
         // The estimate is a sum over w (w y), so the noise is seen through the window twice; where the record is folded upon
         // itself, what is summed is w y over noise of the mean of w^2.
         let folded_up = grid.folded_len() < within.len() as f64;
-        for (signal, bins) in [(&mut *shifted, &mut *y), (&mut *slope, &mut *v)] {
-            if !folded_up {
+        let tapered = !folded_up && self.window.is_some();
+        // What the fit, or the equivalent frequency, has transformed already.
+        let of_kept = std::ptr::eq(grid, &self.kept) && !tapered;
+        let stand = [of_kept, of_kept && !self.in_time && averaged.is_none()];
+        for ((signal, bins), stands) in [(&mut *shifted, &mut *y), (&mut *slope, &mut *v)].into_iter().zip(stand) {
+            if tapered {
                 self.taper(&mut signal[within.clone()], &within);
             }
-            grid.transform(scratch, signal, averages, bins);
+            if !stands {
+                grid.transform(scratch, signal, averages, bins);
+            }
         }
         let (window_power, fourths) = self.window_moments(&within);
         let folded = grid.folded_len();

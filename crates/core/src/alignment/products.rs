@@ -67,14 +67,16 @@ impl Cross<'_> {
 impl Sink for Cross<'_> {
     #[inline(always)]
     fn take<const W: usize>(&mut self, bins: &Bins<W>) {
+        let (ar, ai, br, bi) = (&bins.target_re, &bins.target_im, &bins.measured_re, &bins.measured_im);
+        let mut squared = [1.0; W];
+        if let Some(correction) = self.correction {
+            let at = bins.first - self.first;
+            squared = std::array::from_fn(|i| correction[at + i] * correction[at + i]);
+        }
         for i in 0..W {
-            let (ar, ai) = (bins.target_re[i], bins.target_im[i]);
-            let (br, bi) = (bins.measured_re[i], bins.measured_im[i]);
-            let factor = self.correction.map_or(1.0, |c| c[bins.first - self.first + i]);
-            let squared = factor * factor;
-            self.first_squared[i] += squared * (ar * ar + ai * ai);
-            self.product[i] += squared * (ar * br + ai * bi);
-            self.second_squared[i] += squared * (br * br + bi * bi);
+            self.first_squared[i] += squared[i] * (ar[i] * ar[i] + ai[i] * ai[i]);
+            self.product[i] += squared[i] * (ar[i] * br[i] + ai[i] * bi[i]);
+            self.second_squared[i] += squared[i] * (br[i] * br[i] + bi[i] * bi[i]);
         }
     }
 }
