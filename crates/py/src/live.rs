@@ -23,10 +23,10 @@ fn value(object: &Bound<'_, PyAny>) -> PyResult<Value> {
     if let Ok(text) = object.cast::<PyString>() {
         return Ok(Value::String(text.to_str()?.to_owned()));
     }
-    if object.is_instance_of::<PyInt>() {
-        if let Ok(number) = object.extract::<i64>() {
-            return Ok(Value::from(number));
-        }
+    if object.is_instance_of::<PyInt>()
+        && let Ok(number) = object.extract::<i64>()
+    {
+        return Ok(Value::from(number));
     }
     if object.is_instance_of::<PyInt>() || object.is_instance_of::<PyFloat>() {
         let number = object.extract::<f64>()?;
