@@ -138,9 +138,9 @@ pub struct Alarm {
     pub latched: bool,
     /// When it was raised, in seconds of the stream.
     pub since_s: f64,
-    /// The last value that was compared.
+    /// The largest value since it was raised; before that, the last one.
     pub value: f64,
-    /// With this.
+    /// What it must not exceed.
     pub limit: f64,
     /// Since when the value has been over the limit without a raised alarm.
     pending_s: Option<f64>,
@@ -175,15 +175,16 @@ impl Alarm {
 
     /// Compares; tells whether it was raised or ended by this.
     fn compare(&mut self, time_s: f64, value: f64, config: &AlarmConfig) -> bool {
-        let wait_s = if self.kind == Kind::Silence { 0.0 } else { config.minimum_duration_s };
-        self.value = value;
         if self.active {
-            return value <= self.limit * (1.0 - config.hysteresis) && self.end(config);
+            return self.go_on(value, config);
         }
+        // What is held shows the value that it is held for.
+        self.value = if self.latched { self.value.max(value) } else { value };
         if value <= self.limit {
             self.pending_s = None;
             return false;
         }
+        let wait_s = if self.kind == Kind::Silence { 0.0 } else { config.minimum_duration_s };
         let since_s = *self.pending_s.get_or_insert(time_s);
         // Half a nanosecond for what counting in binary fractions loses.
         if time_s - since_s < wait_s - 5e-10 {
@@ -199,10 +200,17 @@ impl Alarm {
         true
     }
 
-    /// No longer over its limit.
-    fn end(&mut self, config: &AlarmConfig) -> bool {
+    /// Tells whether it ended by this value.
+    fn go_on(&mut self, value: f64, config: &AlarmConfig) -> bool {
+        if value > self.limit * (1.0 - config.hysteresis) {
+            self.value = self.value.max(value);
+            return false;
+        }
         self.active = false;
         self.latched = config.latch && !self.reset_while_active;
+        if !self.latched {
+            self.value = value;
+        }
         !self.latched
     }
 
@@ -385,6 +393,7 @@ pub(crate) mod tests {
             delays(AlarmConfig::default(), &[(1.0, 0.02), (2.0, 0.001), (3.0, 0.02), (4.0, 0.001)]);
         assert_eq!(changes, [(1.0, true)]);
         assert!(alarms.all()[0].latched && !alarms.all()[0].active);
+        assert_eq!(alarms.all()[0].value, 0.02, "it shows what it is held for");
         let mut ended = Vec::new();
         alarms.reset(5.0, |c| ended.push((c.alarm.kind, c.raised)));
         assert_eq!(ended, [(Kind::Delay, false)]);

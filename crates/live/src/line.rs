@@ -155,7 +155,7 @@ impl LineParser {
         let delimiter = *self.delimiter.get_or_insert_with(|| likely_delimiter(line));
         self.split(line, delimiter);
         if self.columns.is_none() {
-            let is_header = self.unwelcome.iter().all(|u| *u);
+            let is_header = self.unwelcome.contains(&true) && self.cells.iter().all(|cell| cell.is_nan());
             match self.resolve(line, delimiter, is_header) {
                 Ok(columns) => self.columns = Some(columns),
                 Err(message) => return Line::Unusable(message),
@@ -369,6 +369,8 @@ mod tests {
 
     #[test]
     fn a_first_line_without_numbers_is_the_header_and_names_find_their_columns() {
+        let mut parser = LineParser::new(named()).unwrap();
+        assert_eq!(read(&mut parser, "y,,n,x").0, Line::Nothing, "a column without a name");
         let mut parser = LineParser::new(named()).unwrap();
         assert_eq!(read(&mut parser, "y, \"n\", x").0, Line::Nothing);
         assert_eq!(read(&mut parser, "2.5, 7, 1.5"), (Line::Sample(Some(7)), vec![1.5], vec![2.5]));

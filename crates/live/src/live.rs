@@ -272,8 +272,10 @@ impl Live {
 
     /// What the log's writer says of itself.
     pub fn note_log(&self, state: Option<String>) {
+        // Numbers may change often; another first word is something new.
+        let kind = |text: &str| text.split(|c: char| !c.is_alphanumeric()).next().map(str::to_owned);
         let mut log = locked(&self.shared.log);
-        if let Some(text) = state.as_ref().filter(|text| log.as_ref() != Some(text)) {
+        if let Some(text) = state.as_ref().filter(|text| log.as_deref().map(kind) != Some(kind(text))) {
             self.shared.remark(format!("log: {text}"));
         }
         *log = state;

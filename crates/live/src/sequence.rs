@@ -1,6 +1,7 @@
 //! Which samples came, which did not, and which came twice, by the sender's counter.
 //!
-//! The counter goes up by one a sample. Integers wrap around at their width.
+//! The counter goes up by one a sample. Integers wrap around at their width. What goes up in other steps, such as seconds or the
+//! ticks of a faster clock, is no counter in this sense: with it every sample would follow a gap, or none would be a count.
 
 /// How far back it is known which samples came.
 const MEMORY: i64 = 1024;

@@ -138,7 +138,7 @@ struct Keys<'a> {
 impl Drop for Keys<'_> {
     fn drop(&mut self) {
         for key in self.map.keys() {
-            self.mistakes.push(format!("{}: unknown key '{key}'", self.whose));
+            self.mistakes.push(format!("{}: unknown key '{}'", self.whose, key.escape_debug()));
         }
     }
 }

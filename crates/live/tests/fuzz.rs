@@ -3,10 +3,12 @@
 use std::sync::Arc;
 
 use rthstrack::{Monitor, MonitorConfig, MonitorState, Reading};
+use rthstrack_live::LiveConfig;
 use rthstrack_live::alarm::{Alarm, AlarmConfig, Change};
 use rthstrack_live::engine::{Engine, EngineConfig, Outlet, Sample, Totals};
 use rthstrack_live::layout::{ByteOrder, Field, Layout, LayoutConfig, Number};
 use rthstrack_live::line::{Column, Format, Line, LineParser, LinesConfig, Splitter};
+use serde_json::{Value, json};
 
 fn cases() -> u64 {
     std::env::var("RTHSTRACK_FUZZ").ok().and_then(|n| n.parse().ok()).unwrap_or(20_000)
@@ -231,6 +233,72 @@ fn any_text_under_any_layout_is_a_sample_or_malformed() {
         }
     }
     assert!(samples > cases() / 100 && malformed > samples && unusable > 0, "{samples} {malformed} {unusable}");
+}
+
+fn setting(random: &mut Random, depth: usize) -> Value {
+    let keys = [
+        "rate_hz",
+        "window_s",
+        "update_hz",
+        "n_actuators",
+        "band_hz",
+        "estimator",
+        "data_decimation",
+        "kind",
+        "address",
+        "layout",
+        "senders",
+        "fill_samples",
+        "counter",
+        "target",
+        "measured",
+        "offset",
+        "type",
+        "scale",
+        "zero",
+        "path",
+        "sample_bytes",
+        "header_bytes",
+        "limit_delay_s",
+        "silence_s",
+        "latch",
+        "log",
+        "names",
+        "format",
+        "delimiter",
+        "x",
+    ];
+    match random.below(if depth == 0 { 6 } else { 9 }) {
+        0 => Value::Null,
+        1 => json!(random.pick(&[0.0, 1.0, -1.0, 0.5, 1e300, 1e-300, 1024.0])),
+        2 => json!(random.pick(&[0u64, 1, 2, 8, 64, 1 << 40, u64::MAX])),
+        3 => json!(random.below(2) == 0),
+        4 | 5 => json!(random.pick(&["udp", "lines", "fei", "f64", "127.0.0.1:0", "", "nan", "i16", ",", "::1"])),
+        6 => (0..random.below(4)).map(|_| setting(random, depth - 1)).collect(),
+        _ => (0..random.below(8)).map(|_| (random.pick(&keys).to_owned(), setting(random, depth - 1))).collect(),
+    }
+}
+
+#[test]
+fn any_settings_are_taken_or_refused_in_words() {
+    let mut refused = 0;
+    for case in 0..cases() / 10 {
+        let mut random = Random::new(case ^ 0x3333);
+        let mut made = || setting(&mut random, 4);
+        let [monitor, mut source, alarms, outputs] = [made(), made(), made(), made()];
+        if let (Value::Object(map), 0) = (&mut source, case % 2) {
+            map.insert("kind".to_owned(), json!(if case % 4 == 0 { "udp" } else { "lines" }));
+            map.insert("address".to_owned(), json!("127.0.0.1:0"));
+        }
+        if let Err(mistakes) = LiveConfig::read(&monitor, &source, &alarms, &outputs) {
+            refused += 1;
+            assert!(
+                !mistakes.is_empty() && mistakes.iter().all(|m| !m.contains('\n') && !m.is_empty()),
+                "{mistakes:?}"
+            );
+        }
+    }
+    assert!(refused > 0);
 }
 
 #[test]
