@@ -45,8 +45,12 @@ pub(crate) fn choice<T: Copy>(py: Python<'_>, setting: &str, names: &[(&str, T)]
         return Ok(*value);
     }
     let known: Vec<&str> = names.iter().map(|(name, _)| *name).collect();
-    let message = format!("{setting} must be one of {}, not '{found}'", known.join(", "));
-    Err(setting_class(py).map_or_else(|e| e, |class| PyErr::from_type(class.clone(), message)))
+    Err(setting_error(py, format!("{setting} must be one of {}, not '{found}'", known.join(", "))))
+}
+
+/// A `SettingError` that says this.
+pub(crate) fn setting_error(py: Python<'_>, message: String) -> PyErr {
+    setting_class(py).map_or_else(|e| e, |class| PyErr::from_type(class.clone(), message))
 }
 
 fn setting_class(py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {

@@ -7,6 +7,7 @@ mod error;
 mod factors;
 mod indices;
 mod key_frequencies;
+mod live;
 mod monitor;
 mod moving;
 mod pool;
@@ -31,5 +32,6 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(indices::index_histories, m)?)?;
     dynamics::register(m)?;
     text::register(m)?;
+    live::register(m)?;
     Ok(())
 }

@@ -1,0 +1,463 @@
+//! Advisory alarms: limits on readings, on lost samples and on silence. No clock of its own.
+//!
+//! An alarm is raised when its value has been over the limit for the minimum duration, and is over when the value has fallen
+//! below the limit by the hysteresis. A latched alarm is then held until it is reset. Readings without numbers change nothing.
+
+use rthstrack::Reading;
+
+/// The user's limits; `None` watches nothing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AlarmConfig {
+    /// Largest |d|, in seconds.
+    pub limit_delay_s: Option<f64>,
+    /// Largest |A - 1|.
+    pub limit_amplitude: Option<f64>,
+    /// The delay at which the test becomes unstable, in seconds.
+    pub critical_delay_s: Option<f64>,
+    /// Largest share of it that a lag may reach.
+    pub critical_fraction: f64,
+    /// Most samples missing among those of the last window.
+    pub limit_lost: Option<u64>,
+    /// Longest time without a sample.
+    pub silence_s: Option<f64>,
+    /// By what share of the limit a value must fall below it.
+    pub hysteresis: f64,
+    /// How long a value must be over the limit. Silence has its own time.
+    pub minimum_duration_s: f64,
+    /// Whether an alarm is held until it is reset.
+    pub latch: bool,
+}
+
+impl Default for AlarmConfig {
+    fn default() -> Self {
+        Self {
+            limit_delay_s: None,
+            limit_amplitude: None,
+            critical_delay_s: None,
+            critical_fraction: 0.5,
+            limit_lost: None,
+            silence_s: Some(1.0),
+            hysteresis: 0.1,
+            minimum_duration_s: 0.0,
+            latch: true,
+        }
+    }
+}
+
+impl AlarmConfig {
+    /// Everything that is wrong with it, a line each.
+    pub fn mistakes(&self) -> Vec<String> {
+        let mut found = Vec::new();
+        let mut positive = |name: &str, value: Option<f64>, what: &str| {
+            if let Some(value) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
+                found.push(format!("{name} must be a positive {what}, not {value}"));
+            }
+        };
+        positive("limit_delay_s", self.limit_delay_s, "duration in seconds");
+        positive("limit_amplitude", self.limit_amplitude, "number, the largest |A - 1|");
+        positive("critical_delay_s", self.critical_delay_s, "duration in seconds");
+        positive("critical_fraction", Some(self.critical_fraction), "share of the critical delay");
+        positive("silence_s", self.silence_s, "duration in seconds");
+        if !(0.0..1.0).contains(&self.hysteresis) {
+            found.push(format!("hysteresis must be a share of the limit from 0 to below 1, not {}", self.hysteresis));
+        }
+        if !(self.minimum_duration_s.is_finite() && self.minimum_duration_s >= 0.0) {
+            let value = self.minimum_duration_s;
+            found.push(format!("minimum_duration_s must be zero or a positive duration in seconds, not {value}"));
+        }
+        found
+    }
+}
+
+/// What an alarm watches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// |d|.
+    Delay,
+    /// |A - 1|.
+    Amplitude,
+    /// d over the critical delay.
+    CriticalDelay,
+    /// Samples missing from the last window.
+    Lost,
+    /// Seconds without a sample.
+    Silence,
+}
+
+impl Kind {
+    /// All kinds, in the order of [`Kind::bit`].
+    pub const ALL: [Kind; 5] = [Kind::Delay, Kind::Amplitude, Kind::CriticalDelay, Kind::Lost, Kind::Silence];
+
+    /// Its name on the wire.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Delay => "delay",
+            Kind::Amplitude => "amplitude",
+            Kind::CriticalDelay => "critical_delay",
+            Kind::Lost => "lost",
+            Kind::Silence => "silence",
+        }
+    }
+
+    /// Its place in a set of alarms.
+    pub fn bit(self) -> u8 {
+        1 << self as u8
+    }
+
+    fn value_of(self, reading: &Reading, config: &AlarmConfig) -> f64 {
+        match self {
+            Kind::Amplitude => (reading.tracking.amplitude - 1.0).abs(),
+            Kind::CriticalDelay => reading.tracking.delay_s / config.critical_delay_s.unwrap_or(f64::NAN),
+            _ => reading.tracking.delay_s.abs(),
+        }
+    }
+
+    fn words(self, value: f64, limit: f64) -> String {
+        match self {
+            Kind::Delay => format!("delay of {:.3} ms, limit {:.3} ms either way", 1e3 * value, 1e3 * limit),
+            Kind::Amplitude => format!("amplitude {:.3} off 1, limit {limit:.3}", value),
+            Kind::CriticalDelay => {
+                format!("delay is {:.0} % of the critical delay, limit {:.0} %", 100.0 * value, 100.0 * limit)
+            }
+            Kind::Lost => format!("{value} samples missing from the last window, limit {limit}"),
+            Kind::Silence => format!("no sample for {value:.1} s, limit {limit:.1} s"),
+        }
+    }
+}
+
+/// One alarm as it stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alarm {
+    /// What it watches.
+    pub kind: Kind,
+    /// Of which actuator; `None` for the stream itself.
+    pub actuator: Option<usize>,
+    /// Over its limit.
+    pub active: bool,
+    /// Held, though no longer over its limit, until it is reset.
+    pub latched: bool,
+    /// When it was raised, in seconds of the stream.
+    pub since_s: f64,
+    /// The largest value since it was raised; before that, the last one.
+    pub value: f64,
+    /// What it must not exceed.
+    pub limit: f64,
+    /// Since when the value has been over the limit without a raised alarm.
+    pending_s: Option<f64>,
+    reset_while_active: bool,
+}
+
+impl Alarm {
+    fn new(kind: Kind, actuator: Option<usize>, limit: f64) -> Self {
+        Self {
+            kind,
+            actuator,
+            active: false,
+            latched: false,
+            since_s: f64::NAN,
+            value: f64::NAN,
+            limit,
+            pending_s: None,
+            reset_while_active: false,
+        }
+    }
+
+    /// Whether it is raised: over its limit or held.
+    pub fn is_raised(&self) -> bool {
+        self.active || self.latched
+    }
+
+    /// What it says, as advice.
+    pub fn text(&self) -> String {
+        let whose = self.actuator.map_or_else(String::new, |a| format!("actuator {a}: "));
+        format!("advisory: {whose}{}", self.kind.words(self.value, self.limit))
+    }
+
+    /// Compares; tells whether it was raised or ended by this.
+    fn compare(&mut self, time_s: f64, value: f64, config: &AlarmConfig) -> bool {
+        if self.active {
+            return self.go_on(value, config);
+        }
+        // What is held shows the value that it is held for.
+        self.value = if self.latched { self.value.max(value) } else { value };
+        if value <= self.limit {
+            self.pending_s = None;
+            return false;
+        }
+        let wait_s = if self.kind == Kind::Silence { 0.0 } else { config.minimum_duration_s };
+        let since_s = *self.pending_s.get_or_insert(time_s);
+        // Half a nanosecond for what counting in binary fractions loses.
+        if time_s - since_s < wait_s - 5e-10 {
+            return false;
+        }
+        self.pending_s = None;
+        self.active = true;
+        self.reset_while_active = false;
+        if self.latched {
+            return false;
+        }
+        self.since_s = time_s;
+        true
+    }
+
+    /// Tells whether it ended by this value.
+    fn go_on(&mut self, value: f64, config: &AlarmConfig) -> bool {
+        if value > self.limit * (1.0 - config.hysteresis) {
+            self.value = self.value.max(value);
+            return false;
+        }
+        self.active = false;
+        self.latched = config.latch && !self.reset_while_active;
+        if !self.latched {
+            self.value = value;
+        }
+        !self.latched
+    }
+
+    /// Tells whether it ended by this. One that is over its limit goes on, and ends by itself.
+    fn reset(&mut self) -> bool {
+        let held = self.latched && !self.active;
+        self.latched = false;
+        self.reset_while_active = self.active;
+        held
+    }
+}
+
+/// An alarm that was raised, or ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Change {
+    /// As it stands now.
+    pub alarm: Alarm,
+    /// Raised, or ended.
+    pub raised: bool,
+    /// When, in seconds of the stream.
+    pub time_s: f64,
+}
+
+impl Change {
+    /// What happened, as advice.
+    pub fn text(&self) -> String {
+        if self.raised {
+            return self.alarm.text();
+        }
+        let whose = self.alarm.actuator.map_or_else(String::new, |a| format!("actuator {a}: "));
+        format!("advisory: {whose}alarm '{}' is over", self.alarm.kind.name())
+    }
+}
+
+/// All alarms of a stream.
+#[derive(Debug, Clone)]
+pub struct Alarms {
+    config: AlarmConfig,
+    alarms: Vec<Alarm>,
+}
+
+impl Alarms {
+    /// The alarms that a configuration without mistakes asks for.
+    pub fn new(config: AlarmConfig, n_actuators: usize) -> Self {
+        let mut alarms = Vec::new();
+        for actuator in 0..n_actuators {
+            let mut watch = |kind, limit: Option<f64>| {
+                alarms.extend(limit.map(|limit| Alarm::new(kind, Some(actuator), limit)));
+            };
+            watch(Kind::Delay, config.limit_delay_s);
+            watch(Kind::Amplitude, config.limit_amplitude);
+            watch(Kind::CriticalDelay, config.critical_delay_s.map(|_| config.critical_fraction));
+        }
+        alarms.extend(config.limit_lost.map(|limit| Alarm::new(Kind::Lost, None, limit as f64)));
+        alarms.extend(config.silence_s.map(|limit| Alarm::new(Kind::Silence, None, limit)));
+        Self { config, alarms }
+    }
+
+    /// As they stand.
+    pub fn all(&self) -> &[Alarm] {
+        &self.alarms
+    }
+
+    /// Which are raised for an actuator, and for the stream: the sum of their bits.
+    pub fn raised(&self, actuator: usize) -> u8 {
+        let concerned = self.alarms.iter().filter(|a| a.is_raised() && a.actuator.is_none_or(|of| of == actuator));
+        concerned.fold(0, |set, alarm| set | alarm.kind.bit())
+    }
+
+    /// Compares a reading with the limits of its actuator.
+    pub fn read(&mut self, reading: &Reading, tell: impl FnMut(Change)) {
+        if !reading.is_valid() {
+            return;
+        }
+        let config = self.config;
+        let value = |kind: Kind| kind.value_of(reading, &config);
+        self.compare(Some(reading.actuator), reading.time_s, |kind| Some(value(kind)), tell);
+    }
+
+    /// Compares how many samples are missing from the last window.
+    pub fn count(&mut self, time_s: f64, lost: u64, tell: impl FnMut(Change)) {
+        self.compare(None, time_s, |kind| (kind == Kind::Lost).then_some(lost as f64), tell);
+    }
+
+    /// Compares how long nothing has come.
+    pub fn wait(&mut self, time_s: f64, silent_s: f64, tell: impl FnMut(Change)) {
+        self.compare(None, time_s, |kind| (kind == Kind::Silence).then_some(silent_s), tell);
+    }
+
+    /// Ends what is held; what is over its limit goes on.
+    pub fn reset(&mut self, time_s: f64, mut tell: impl FnMut(Change)) {
+        for alarm in &mut self.alarms {
+            if alarm.reset() {
+                tell(Change { alarm: *alarm, raised: false, time_s });
+            }
+        }
+    }
+
+    fn compare(
+        &mut self,
+        actuator: Option<usize>,
+        time_s: f64,
+        value: impl Fn(Kind) -> Option<f64>,
+        mut tell: impl FnMut(Change),
+    ) {
+        for alarm in self.alarms.iter_mut().filter(|a| a.actuator == actuator) {
+            // NaN compares as nothing.
+            let Some(value) = value(alarm.kind).filter(|v| !v.is_nan()) else { continue };
+            if alarm.compare(time_s, value, &self.config) {
+                tell(Change { alarm: *alarm, raised: alarm.active, time_s });
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use rthstrack::{Monitor, MonitorConfig};
+
+    /// A reading with these numbers, as the core would give it.
+    pub(crate) fn reading(actuator: usize, time_s: f64, amplitude: f64, delay_s: f64) -> Reading {
+        let config = MonitorConfig { rate_hz: 64.0, window_s: 1.0, update_hz: 1.0, ..MonitorConfig::default() };
+        let monitor = Monitor::new(config).unwrap();
+        let mut state = monitor.state();
+        let sample = |i: usize| [(i as f64 * 0.7).sin()];
+        let mut made = (0..64).find_map(|i| monitor.step(&mut state, &sample(i), &sample(i)).map(|r| r[0])).unwrap();
+        assert!(made.is_valid());
+        (made.actuator, made.time_s, made.tracking.amplitude, made.tracking.delay_s) =
+            (actuator, time_s, amplitude, delay_s);
+        made
+    }
+
+    fn invalid(time_s: f64) -> Reading {
+        let monitor =
+            Monitor::new(MonitorConfig { rate_hz: 64.0, window_s: 1.0, update_hz: 1.0, ..Default::default() }).unwrap();
+        let mut state = monitor.state();
+        let mut made = (0..64).find_map(|_| monitor.step(&mut state, &[0.0], &[0.0]).map(|r| r[0])).unwrap();
+        assert!(!made.is_valid());
+        made.time_s = time_s;
+        made
+    }
+
+    fn delays(config: AlarmConfig, series: &[(f64, f64)]) -> (Vec<(f64, bool)>, Alarms) {
+        let mut alarms = Alarms::new(AlarmConfig { limit_delay_s: Some(0.010), ..config }, 1);
+        let mut changes = Vec::new();
+        for (time_s, delay_s) in series {
+            let reading = if delay_s.is_nan() { invalid(*time_s) } else { reading(0, *time_s, 1.0, *delay_s) };
+            alarms.read(&reading, |c| changes.push((c.time_s, c.raised)));
+        }
+        (changes, alarms)
+    }
+
+    #[test]
+    fn an_alarm_is_raised_over_its_limit_and_ends_below_the_hysteresis() {
+        let config = AlarmConfig { latch: false, ..AlarmConfig::default() };
+        let series = [(1.0, 0.009), (2.0, 0.010), (3.0, 0.0101), (4.0, 0.0095), (5.0, 0.0089), (6.0, 0.011)];
+        assert_eq!(delays(config, &series).0, [(3.0, true), (5.0, false), (6.0, true)]);
+    }
+
+    #[test]
+    fn a_lead_is_over_the_limit_of_delay_as_a_lag_is() {
+        assert_eq!(delays(AlarmConfig::default(), &[(1.0, -0.011)]).0, [(1.0, true)]);
+    }
+
+    #[test]
+    fn a_lead_is_never_a_share_of_the_critical_delay() {
+        let config = AlarmConfig { critical_delay_s: Some(0.008), ..AlarmConfig::default() };
+        let mut alarms = Alarms::new(config, 1);
+        let mut raised = Vec::new();
+        for (time_s, delay_s) in [(1.0, -0.020), (2.0, 0.0039), (3.0, 0.0041)] {
+            alarms.read(&reading(0, time_s, 1.0, delay_s), |c| raised.push((c.time_s, c.alarm.kind)));
+        }
+        assert_eq!(raised, [(3.0, Kind::CriticalDelay)]);
+    }
+
+    #[test]
+    fn a_latched_alarm_is_held_until_reset() {
+        let (changes, mut alarms) =
+            delays(AlarmConfig::default(), &[(1.0, 0.02), (2.0, 0.001), (3.0, 0.02), (4.0, 0.001)]);
+        assert_eq!(changes, [(1.0, true)]);
+        assert!(alarms.all()[0].latched && !alarms.all()[0].active);
+        assert_eq!(alarms.all()[0].value, 0.02, "it shows what it is held for");
+        let mut ended = Vec::new();
+        alarms.reset(5.0, |c| ended.push((c.alarm.kind, c.raised)));
+        assert_eq!(ended, [(Kind::Delay, false)]);
+        assert!(!alarms.all()[0].is_raised());
+    }
+
+    #[test]
+    fn a_reset_does_not_silence_what_is_still_over_its_limit() {
+        let (_, mut alarms) = delays(AlarmConfig::default(), &[(1.0, 0.02)]);
+        alarms.reset(1.5, |_| panic!("still over"));
+        assert!(alarms.all()[0].active);
+        let mut changes = Vec::new();
+        alarms.read(&reading(0, 2.0, 1.0, 0.001), |c| changes.push(c.raised));
+        assert_eq!(changes, [false], "it ends by itself: it has been seen");
+    }
+
+    #[test]
+    fn a_short_excess_is_no_alarm_where_a_minimum_duration_is_asked() {
+        let config = AlarmConfig { minimum_duration_s: 1.0, ..AlarmConfig::default() };
+        let series = [(1.0, 0.02), (1.5, 0.02), (1.6, 0.001), (2.0, 0.02), (2.5, 0.02), (3.0, 0.02)];
+        assert_eq!(delays(config, &series).0, [(3.0, true)]);
+    }
+
+    #[test]
+    fn readings_without_numbers_neither_raise_nor_clear() {
+        let config = AlarmConfig { latch: false, ..AlarmConfig::default() };
+        let series = [(1.0, f64::NAN), (2.0, 0.02), (3.0, f64::NAN), (4.0, f64::NAN)];
+        let (changes, alarms) = delays(config, &series);
+        assert_eq!(changes, [(2.0, true)]);
+        assert!(alarms.all()[0].active);
+    }
+
+    #[test]
+    fn every_text_says_that_it_is_advisory() {
+        for kind in Kind::ALL {
+            let alarm = Alarm { value: 2.0, active: true, ..Alarm::new(kind, Some(1), 1.0) };
+            assert!(alarm.text().starts_with("advisory: actuator 1: "), "{}", alarm.text());
+            let over = Change { alarm, raised: false, time_s: 0.0 };
+            assert!(over.text().contains("advisory") && over.text().contains(kind.name()));
+        }
+    }
+
+    #[test]
+    fn the_set_of_raised_alarms_is_that_of_the_actuator_and_the_stream() {
+        let config = AlarmConfig { limit_amplitude: Some(0.1), limit_lost: Some(3), ..AlarmConfig::default() };
+        let mut alarms = Alarms::new(config, 2);
+        alarms.read(&reading(1, 1.0, 1.2, 0.0), |_| ());
+        alarms.count(1.0, 4, |_| ());
+        alarms.wait(1.0, 0.5, |_| panic!("not silent yet"));
+        assert_eq!(alarms.raised(0), Kind::Lost.bit());
+        assert_eq!(alarms.raised(1), Kind::Lost.bit() | Kind::Amplitude.bit());
+    }
+
+    #[test]
+    fn all_mistakes_are_told_at_once() {
+        let config = AlarmConfig {
+            limit_delay_s: Some(-1.0),
+            limit_amplitude: Some(f64::NAN),
+            hysteresis: 1.0,
+            minimum_duration_s: f64::INFINITY,
+            silence_s: Some(0.0),
+            ..AlarmConfig::default()
+        };
+        assert_eq!(config.mistakes().len(), 5, "{:#?}", config.mistakes());
+        assert!(AlarmConfig::default().mistakes().is_empty());
+    }
+}

@@ -1,0 +1,234 @@
+//! What the page and the terminal view are told, as JSON.
+
+use std::sync::{Arc, Mutex};
+
+use rthstrack::{Estimator, Monitor};
+
+use crate::alarm::AlarmConfig;
+use crate::board::{Board, Event};
+use crate::json::{self, boolean, key, list, number, optional, text, whole};
+use crate::shared::{Shared, locked};
+use crate::spectrum::{Spectra, windows};
+
+/// Samples a second of the scope that a picture needs.
+const SCOPE_HZ: f64 = 512.0;
+/// And how much of the past is sent to a new page, a window at least.
+const SCOPE_S: f64 = 10.0;
+const STATUS_EVENTS: usize = 20;
+
+/// Everything that is looked at.
+pub(crate) struct Page {
+    shared: Arc<Shared>,
+    monitor: Arc<Monitor>,
+    pub(crate) board: Mutex<Board>,
+    spectra: Mutex<Spectra>,
+    hello: String,
+    stride: u64,
+}
+
+impl Page {
+    pub(crate) fn new(
+        shared: Arc<Shared>,
+        monitor: Arc<Monitor>,
+        board: Board,
+        limits: &AlarmConfig,
+        source: &str,
+        names: &[String],
+    ) -> Self {
+        Self {
+            spectra: Mutex::new(Spectra::new(monitor.evaluator())),
+            board: Mutex::new(board),
+            hello: hello(&monitor, limits, source, names),
+            stride: (monitor.evaluated_rate_hz() / SCOPE_HZ).ceil().max(1.0) as u64,
+            shared,
+            monitor,
+        }
+    }
+
+    /// What does not change.
+    pub(crate) fn hello(&self) -> String {
+        self.hello.clone()
+    }
+
+    /// What is new since a cursor, and the cursor after it. An unknown cursor has seen nothing.
+    pub(crate) fn frame(&self, cursor: u64) -> (String, u64) {
+        self.refresh_spectrum();
+        let mut out = String::with_capacity(16_384);
+        out.push('{');
+        self.head(&mut out);
+        let board = locked(&self.board);
+        let since = if cursor > board.version { 0 } else { cursor };
+        key(&mut out, "readings");
+        list(&mut out, board.readings_since(since), json::reading_row);
+        self.scope(&mut out, &board, since);
+        self.alarms(&mut out, &board);
+        key(&mut out, "events");
+        list(&mut out, board.events_since(since), event);
+        let version = board.version;
+        drop(board);
+        key(&mut out, "spectrum");
+        let spectra = locked(&self.spectra);
+        // Made of a version that the reader may know already.
+        if spectra.latest.0 > since {
+            out.push_str(&spectra.latest.1);
+        } else {
+            out.push_str("null");
+        }
+        out.push('}');
+        (out, version)
+    }
+
+    /// The latest reading of each actuator, and how all stands.
+    pub(crate) fn status(&self) -> String {
+        let mut out = String::with_capacity(4096);
+        out.push('{');
+        self.head(&mut out);
+        let board = locked(&self.board);
+        key(&mut out, "readings");
+        list(&mut out, &board.latest, |out, reading| match reading {
+            Some(reading) => json::reading(out, reading),
+            None => out.push_str("null"),
+        });
+        self.alarms(&mut out, &board);
+        key(&mut out, "events");
+        list(&mut out, board.last_events(STATUS_EVENTS), event);
+        out.push('}');
+        out
+    }
+
+    fn head(&self, out: &mut String) {
+        let shared = &self.shared;
+        let summary = shared.summary();
+        let (totals, tally) = (summary.totals, summary.totals.tally);
+        key(out, "time_s");
+        number(out, shared.time_s());
+        key(out, "state");
+        text(out, shared.state());
+        key(out, "health");
+        out.push('{');
+        let counts = [
+            ("received", tally.received),
+            ("lost", tally.lost),
+            ("repeated", tally.repeated),
+            ("reordered", tally.reordered),
+            ("malformed", totals.malformed),
+            ("refused", totals.refused),
+            ("filled", tally.filled),
+            ("restarts", tally.restarts),
+            ("readings", totals.readings),
+            ("log_dropped", summary.log_dropped),
+            ("unsent", summary.unsent),
+        ];
+        for (name, count) in counts {
+            key(out, name);
+            whole(out, count);
+        }
+        key(out, "pace_hz");
+        number(out, shared.pace_hz());
+        key(out, "age_s");
+        number(out, shared.age_s());
+        key(out, "log");
+        json::displayed(out, locked(&shared.log).as_ref());
+        out.push('}');
+    }
+
+    fn scope(&self, out: &mut String, board: &Board, since: u64) {
+        let n = self.monitor.config().n_actuators;
+        let most_s = SCOPE_S.max(self.monitor.config().window_s);
+        let (rows, end_s) = board.scope.since(since, self.stride, most_s);
+        key(out, "scope");
+        out.push('{');
+        key(out, "rate_hz");
+        number(out, self.monitor.evaluated_rate_hz() / self.stride as f64);
+        key(out, "end_s");
+        number(out, if rows.is_empty() { f64::NAN } else { end_s });
+        for (name, measured) in [("target", false), ("measured", true)] {
+            key(out, name);
+            list(out, 0..n, |out, actuator| {
+                list(out, &rows, |out, row| json::coarse(out, board.scope.at(*row, actuator, measured)));
+            });
+        }
+        out.push('}');
+    }
+
+    fn alarms(&self, out: &mut String, board: &Board) {
+        key(out, "alarms");
+        list(out, &board.alarms, json::alarm);
+    }
+
+    /// One caller makes it; others meanwhile show the last.
+    fn refresh_spectrum(&self) {
+        let now_s = self.shared.now_s();
+        let Ok(mut spectra) = self.spectra.try_lock() else { return };
+        if !spectra.is_due(now_s) {
+            return;
+        }
+        let evaluator = self.monitor.evaluator();
+        let board = locked(&self.board);
+        let found = windows(&board, evaluator, self.monitor.config().n_actuators);
+        let version = board.version;
+        drop(board);
+        if let Some(windows) = found {
+            spectra.make(now_s, version, evaluator, &windows);
+        }
+    }
+}
+
+fn event(out: &mut String, event: &Event) {
+    out.push('{');
+    key(out, "time_s");
+    number(out, event.time_s);
+    key(out, "text");
+    text(out, &event.text);
+    out.push('}');
+}
+
+fn hello(monitor: &Monitor, limits: &AlarmConfig, source: &str, names: &[String]) -> String {
+    let config = monitor.config();
+    let mut made = String::from("{");
+    let out = &mut made;
+    key(out, "version");
+    text(out, env!("CARGO_PKG_VERSION"));
+    for (name, value) in [
+        ("rate_hz", config.rate_hz),
+        ("window_s", config.window_s),
+        ("update_hz", monitor.update_hz()),
+        ("latency_s", monitor.latency_s()),
+    ] {
+        key(out, name);
+        number(out, value);
+    }
+    key(out, "estimator");
+    text(out, Estimator::NAMES.iter().find(|(_, e)| *e == config.estimator).map_or("", |(name, _)| name));
+    key(out, "band_hz");
+    match config.band_hz {
+        Some((low, high)) => list(out, [low, high], number),
+        None => out.push_str("null"),
+    }
+    key(out, "n_actuators");
+    whole(out, config.n_actuators as u64);
+    key(out, "names");
+    list(out, 0..config.n_actuators, |out, a| match names.get(a) {
+        Some(name) => text(out, name),
+        None => text(out, &format!("actuator {a}")),
+    });
+    key(out, "source");
+    text(out, source);
+    key(out, "limits");
+    out.push('{');
+    for (name, value) in [
+        ("delay_s", limits.limit_delay_s),
+        ("amplitude", limits.limit_amplitude),
+        ("critical_delay_s", limits.critical_delay_s),
+        ("critical_fraction", limits.critical_delay_s.map(|_| limits.critical_fraction)),
+        ("lost", limits.limit_lost.map(|n| n as f64)),
+        ("silence_s", limits.silence_s),
+    ] {
+        key(out, name);
+        optional(out, value);
+    }
+    key(out, "latch");
+    boolean(out, limits.latch);
+    out.push_str("}}");
+    made
+}

@@ -1,0 +1,216 @@
+//! `Live`: the on-line monitor. Settings come as dicts, text and arrays go back.
+
+use std::time::Duration;
+
+use numpy::{IntoPyArray, ndarray::Array2};
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
+use rthstrack_live::{LiveConfig, LiveError, LoggedReading};
+use serde_json::{Map, Number, Value};
+
+use crate::error::setting_error;
+use crate::tracking::words;
+
+/// A setting of plain Python types. Numbers that JSON does not know stay in words, so that their mistake can be told.
+fn value(object: &Bound<'_, PyAny>) -> PyResult<Value> {
+    if object.is_none() {
+        return Ok(Value::Null);
+    }
+    if let Ok(flag) = object.cast::<PyBool>() {
+        return Ok(Value::Bool(flag.is_true()));
+    }
+    if let Ok(text) = object.cast::<PyString>() {
+        return Ok(Value::String(text.to_str()?.to_owned()));
+    }
+    if object.is_instance_of::<PyInt>()
+        && let Ok(number) = object.extract::<i64>()
+    {
+        return Ok(Value::from(number));
+    }
+    if object.is_instance_of::<PyInt>() || object.is_instance_of::<PyFloat>() {
+        let number = object.extract::<f64>()?;
+        return Ok(Number::from_f64(number).map_or_else(|| Value::String(number.to_string()), Value::Number));
+    }
+    if let Ok(dict) = object.cast::<PyDict>() {
+        let mut map = Map::new();
+        for (key, item) in dict {
+            map.insert(key.extract()?, value(&item)?);
+        }
+        return Ok(Value::Object(map));
+    }
+    if object.is_instance_of::<PyList>() || object.is_instance_of::<PyTuple>() {
+        return Ok(Value::Array(object.try_iter()?.map(|item| value(&item?)).collect::<PyResult<_>>()?));
+    }
+    // A path.
+    if let Ok(path) = object.call_method0("__fspath__") {
+        return value(&path);
+    }
+    Err(PyTypeError::new_err(format!("a setting cannot be a {}", object.get_type().name()?)))
+}
+
+fn to_py(py: Python<'_>, error: LiveError) -> PyErr {
+    match error {
+        LiveError::Settings(mistakes) => setting_error(py, mistakes.join("\n")),
+        LiveError::System(error) => error.into(),
+    }
+}
+
+/// The on-line monitor; its threads are Rust's and never wait for Python.
+#[pyclass(frozen, module = "rthstrack._core")]
+struct Live {
+    run: rthstrack_live::Live,
+}
+
+#[pymethods]
+impl Live {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        monitor: &Bound<'_, PyDict>,
+        source: &Bound<'_, PyDict>,
+        alarms: &Bound<'_, PyDict>,
+        outputs: &Bound<'_, PyDict>,
+    ) -> PyResult<Self> {
+        let [monitor, source, alarms, outputs] = [value(monitor)?, value(source)?, value(alarms)?, value(outputs)?];
+        let opened = py.detach(|| {
+            let config = LiveConfig::read(&monitor, &source, &alarms, &outputs).map_err(LiveError::Settings)?;
+            rthstrack_live::Live::new(config)
+        });
+        Ok(Self { run: opened.map_err(|error| to_py(py, error))? })
+    }
+
+    fn start(&self, py: Python<'_>) -> PyResult<()> {
+        Ok(py.detach(|| self.run.start())?)
+    }
+
+    fn stop(&self, py: Python<'_>) {
+        py.detach(|| self.run.stop());
+    }
+
+    /// True when the run has ended.
+    fn wait(&self, py: Python<'_>, timeout_s: f64) -> bool {
+        // A year stands for ever; what is no number does not wait.
+        let timeout = Duration::from_secs_f64(if timeout_s.is_nan() { 0.0 } else { timeout_s.clamp(0.0, 3e7) });
+        py.detach(|| self.run.wait(timeout))
+    }
+
+    fn address(&self) -> &str {
+        self.run.address()
+    }
+
+    fn control_address(&self) -> &str {
+        self.run.control_address()
+    }
+
+    fn fatal(&self) -> Option<String> {
+        self.run.fatal()
+    }
+
+    fn reset(&self) {
+        self.run.reset();
+    }
+
+    fn summary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let summary = self.run.summary();
+        let (totals, tally) = (summary.totals, summary.totals.tally);
+        let counts = [
+            ("received", tally.received),
+            ("lost", tally.lost),
+            ("repeated", tally.repeated),
+            ("reordered", tally.reordered),
+            ("malformed", totals.malformed),
+            ("readings", totals.readings),
+            ("alarms", totals.alarms),
+            ("filled", tally.filled),
+            ("restarts", tally.restarts),
+            ("refused", totals.refused),
+            ("log_dropped", summary.log_dropped),
+            ("unsent", summary.unsent),
+            ("not_written", summary.not_written),
+        ];
+        let dict = PyDict::new(py);
+        counts.iter().try_for_each(|(name, count)| dict.set_item(name, count))?;
+        Ok(dict)
+    }
+
+    fn alarmed(&self) -> bool {
+        self.run.alarmed()
+    }
+
+    fn hello(&self) -> String {
+        self.run.hello()
+    }
+
+    /// JSON of what is new since the cursor, and the next cursor.
+    fn frame(&self, py: Python<'_>, cursor: u64) -> (String, u64) {
+        py.detach(|| self.run.frame(cursor))
+    }
+
+    fn status(&self, py: Python<'_>) -> String {
+        py.detach(|| self.run.status())
+    }
+
+    /// Drains the samples that wait for the log.
+    fn take_samples<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let columns = py.detach(|| self.run.take_samples());
+        let shape = (columns.index.len(), self.run.n_actuators());
+        let signal = |values| Array2::from_shape_vec(shape, values).expect("one sample a row").into_pyarray(py);
+        let dict = PyDict::new(py);
+        dict.set_item("index", columns.index.into_pyarray(py))?;
+        dict.set_item("time_s", columns.time_s.into_pyarray(py))?;
+        dict.set_item("counter", columns.counter.into_pyarray(py))?;
+        dict.set_item("filled", columns.filled.into_pyarray(py))?;
+        dict.set_item("target", signal(columns.target))?;
+        dict.set_item("measured", signal(columns.measured))?;
+        Ok(dict)
+    }
+
+    /// Drains the readings that wait for the log.
+    fn take_readings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let logged = py.detach(|| self.run.take_readings());
+        let dict = PyDict::new(py);
+        let numbers = |name: &str, of: fn(&LoggedReading) -> f64| {
+            dict.set_item(name, logged.iter().map(of).collect::<Vec<f64>>().into_pyarray(py))
+        };
+        let whole = |name: &str, of: fn(&LoggedReading) -> u64| {
+            dict.set_item(name, logged.iter().map(|r| of(r) as i64).collect::<Vec<i64>>().into_pyarray(py))
+        };
+        let interval = |name: &str, of: fn(&LoggedReading) -> (f64, f64)| {
+            let ends = logged.iter().map(of).flat_map(|(low, high)| [low, high]).collect();
+            let rows = Array2::from_shape_vec((logged.len(), 2), ends).expect("low and high");
+            dict.set_item(name, rows.into_pyarray(py))
+        };
+        whole("index", |r| r.reading.index)?;
+        numbers("time_s", |r| r.reading.time_s)?;
+        numbers("centre_s", |r| r.reading.centre_s)?;
+        whole("actuator", |r| r.reading.actuator as u64)?;
+        numbers("amplitude", |r| r.reading.tracking.amplitude)?;
+        numbers("delay_s", |r| r.reading.tracking.delay_s)?;
+        numbers("phase_rad", |r| r.reading.tracking.phase_rad)?;
+        numbers("equivalent_frequency_hz", |r| r.reading.tracking.equivalent_frequency_hz)?;
+        interval("amplitude_interval", |r| r.reading.tracking.amplitude_interval)?;
+        interval("delay_interval_s", |r| r.reading.tracking.delay_interval_s)?;
+        let valid: Vec<bool> = logged.iter().map(|r| r.reading.is_valid()).collect();
+        dict.set_item("valid", valid.into_pyarray(py))?;
+        let reasons: Vec<Option<String>> =
+            logged.iter().map(|r| r.reading.tracking.reason.as_ref().map(|reason| words(Some(reason)))).collect();
+        dict.set_item("reason", reasons)?;
+        whole("received", |r| r.totals.tally.received)?;
+        whole("lost", |r| r.totals.tally.lost)?;
+        whole("repeated", |r| r.totals.tally.repeated)?;
+        whole("reordered", |r| r.totals.tally.reordered)?;
+        whole("malformed", |r| r.totals.malformed)?;
+        dict.set_item("alarms", logged.into_iter().map(|r| r.alarms).collect::<Vec<String>>())?;
+        Ok(dict)
+    }
+
+    /// What the log's writer says of itself; None when there is no log.
+    fn note_log(&self, state: Option<String>) {
+        self.run.note_log(state);
+    }
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Live>()
+}
