@@ -35,6 +35,10 @@ setup: .venv/built ## the virtual environment, with the package built into it
 demo: .venv/built ## evaluates a record of a test: printed verdict and HTML report
 	@$(BIN)/python examples/demo.py
 
+.PHONY: demo-live
+demo-live: .venv/built ## a test sent at its own pace, watched by the monitor: table here, live page in the browser
+	@$(BIN)/python examples/live/demo.py
+
 .PHONY: test
 test: lint test-rust test-stubs test-doctests test-examples test-python ## every check; what continuous integration runs
 
