@@ -98,10 +98,11 @@ install-c: toolchain ## C interface: header, libraries, pkg-config file under PR
 	@crates/capi/install.sh "$(PREFIX)"
 
 .PHONY: fuzz
-fuzz: .venv/built toolchain ## odd input at length: 200,000 for our reader and for the evaluation, 5,000 for each library's reader
+fuzz: .venv/built toolchain ## odd input at length: 1,000,000 for the monitor's parsers, 200,000 for our reader and the evaluation, 5,000 for each library's reader
 	$(call say,fuzz tests)
 	@mkdir -p $(OUT)
-	@RTHSTRACK_FUZZ=200000 cargo test --workspace --locked --test fuzz 2>&1 | tee $(OUT)/fuzz.log
+	@RTHSTRACK_FUZZ=200000 cargo test --workspace --exclude rthstrack-live --locked --test fuzz 2>&1 | tee $(OUT)/fuzz.log
+	@RTHSTRACK_FUZZ=1000000 cargo test --package rthstrack-live --locked --test fuzz 2>&1 | tee -a $(OUT)/fuzz.log
 	@$(call ran_some,$(OUT)/fuzz.log)
 	@RTHSTRACK_FUZZ=5000 $(BIN)/pytest tests/test_readers_damage.py
 
@@ -117,6 +118,17 @@ bench: .venv/built ## benchmark beside SciPy; writes docs/benchmarks.md
 .PHONY: accuracy
 accuracy: .venv/built ## gain and delay beside the truth, and their intervals; writes docs/accuracy.md and figures
 	@$(BIN)/python benchmarks/accuracy.py
+
+.PHONY: online
+online: .venv/built ## how soon a reading follows a step and a ramp in delay; writes docs/online-response.md and its figure
+	@$(BIN)/python benchmarks/online_response.py
+
+.PHONY: soak
+soak: .venv/ready toolchain ## 10^8 samples through the monitor: the last reading has the bits of an early one
+	@mkdir -p $(OUT)
+	@RTHSTRACK_SOAK=100000000 cargo test --package rthstrack --locked --test monitor nothing_drifts 2>&1 \
+		| tee $(OUT)/soak.log
+	@$(call ran_some,$(OUT)/soak.log)
 
 .PHONY: docs
 docs: .venv/ready toolchain ## documentation of the Rust core, in target/doc

@@ -1,4 +1,4 @@
-"""The README's Python and commands, and the estimators' page's, run as pasted: in order, in an empty folder a page."""
+"""The README's Python and commands, and those of two pages of docs, run as pasted: in order, in an empty folder a page."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-PAGES = ("README.md", "docs/estimators.md")
+PAGES = ("README.md", "docs/estimators.md", "docs/online.md")
 
 # What a reader does once, before anything can be pasted; `make test` and test_install.py try these.
 SETTING_UP = ("pip ", "python -m pip", "git ", "make", "cargo ", "cd ", "apt")
@@ -69,7 +69,7 @@ def test_the_readmes_python_runs_as_pasted(pasted: dict[str, list[str]]) -> None
 
 
 def test_the_readmes_commands_run_as_pasted(pasted: dict[str, list[str]]) -> None:
-    assert any(command.startswith("rthstrack evaluate") for command in pasted["shell"])
+    assert any(command.startswith(("rthstrack evaluate", "rthstrack monitor")) for command in pasted["shell"])
 
 
 @pytest.mark.parametrize("page", PAGES)
