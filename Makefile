@@ -10,6 +10,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 OUT := build
 PEERS := $(OUT)/peers
+PREFIX ?= /usr/local
 # One interpreter for every cargo command: with another, cargo would build the bindings anew each time.
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 export MPLBACKEND := Agg
@@ -87,6 +88,10 @@ test-python: .venv/built ## Python tests; browser tests where there is a Chromiu
 	@command -v chromium || command -v chromium-browser || command -v google-chrome \
 		|| echo "NO CHROMIUM FOUND: the browser tests will be skipped (Debian: apt-get install chromium)"
 	@$(BIN)/pytest -n auto --dist loadfile
+
+.PHONY: install-c
+install-c: toolchain ## C interface: header, libraries, pkg-config file under PREFIX (/usr/local unless given)
+	@crates/capi/install.sh "$(PREFIX)"
 
 .PHONY: fuzz
 fuzz: .venv/built toolchain ## odd input at length: 200,000 for our reader and for the evaluation, 5,000 for each library's reader

@@ -59,6 +59,24 @@ def write_parquet(path: Path) -> None:
     pq.write_table(pa.table({"when": stamps, "target": TARGET, "measured": MEASURED, "word": ["x"] * 200}), path)
 
 
+def arrow_table() -> pa.Table:
+    fields = [pa.field(name, pa.float64(), metadata={"unit": "mm"}) for name in ("target", "measured")]
+    schema = pa.schema([pa.field("time_s", pa.float64()), *fields, pa.field("filled", pa.bool_())], {"rate_hz": "50.0"})
+    return pa.table([T, TARGET, MEASURED, np.zeros(200, bool)], schema=schema)
+
+
+def write_arrow_stream(path: Path) -> None:
+    table = arrow_table()
+    with pa.ipc.new_stream(path, table.schema) as writer:
+        writer.write_table(table, max_chunksize=40)
+
+
+def write_arrow_file(path: Path) -> None:
+    table = arrow_table()
+    with pa.ipc.new_file(path, table.schema) as writer:
+        writer.write_table(table, max_chunksize=40)
+
+
 def write_npz(path: Path) -> None:
     np.savez_compressed(path, target=TARGET, measured=MEASURED, rate_hz=50.0)
 
@@ -79,10 +97,16 @@ WRITERS: dict[str, Callable[[Path], None]] = {
     "h5": write_hdf5,
     "tdms": write_tdms,
     "parquet": write_parquet,
+    "arrows": write_arrow_stream,
+    "arrow": write_arrow_file,
     "npz": write_npz,
     "npy": write_npy,
     "mat": write_mat,
 }
+
+
+# What was written piece by piece is read as far as its pieces are whole.
+TOLERANT = ("arrows", "arrow")
 
 
 def damaged(whole: bytes, chance: random.Random) -> bytes:
@@ -146,11 +170,11 @@ def test_damaged_files_end_in_one_line_or_in_a_reading(tmp_path: Path, ending: s
         else:
             assert recording.channels
             assert all(channel.values.dtype == np.float64 for channel in recording.channels)
-    # Otherwise the damage was none.
-    assert n_errors > n // 8
+    # Otherwise the damage was none. Whole batches of an Arrow stream are read whatever comes behind them.
+    assert n_errors > n // (16 if ending in TOLERANT else 8)
 
 
-@pytest.mark.parametrize("ending", [ending for ending in WRITERS if ending not in ("csv", "mat")])
+@pytest.mark.parametrize("ending", [ending for ending in WRITERS if ending not in ("csv", "mat", *TOLERANT)])
 def test_files_cut_off_anywhere_are_an_error(tmp_path: Path, ending: str) -> None:
     path = tmp_path / f"file.{ending}"
     WRITERS[ending](path)
@@ -163,9 +187,30 @@ def test_files_cut_off_anywhere_are_an_error(tmp_path: Path, ending: str) -> Non
             assert ending == "tdms" or length > len(whole) - 1024
 
 
+@pytest.mark.parametrize("ending", TOLERANT)
+def test_an_arrow_stream_cut_off_anywhere_is_read_to_its_last_whole_batch(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"file.{ending}"
+    WRITERS[ending](path)
+    whole = path.read_bytes()
+    lengths = []
+    for length in [*range(1, len(whole) - 8, 7), *range(len(whole) - 8, len(whole))]:
+        path.write_bytes(whole[:length])
+        recording = read_or_error(path)
+        if recording is None:
+            lengths.append(0)
+            continue
+        values = recording["target"].values
+        lengths.append(len(values))
+        assert np.array_equal(values, TARGET[: len(values)])
+        assert recording.rate_hz == 50.0
+        assert any("cut off" in note or "no end marker" in note or "end is missing" in note for note in recording.notes)
+    assert lengths == sorted(lengths)
+    assert set(lengths) == {0, 40, 80, 120, 160, 200}
+
+
 def test_bytes_without_any_meaning_are_an_error(tmp_path: Path) -> None:
     chance = random.Random(5)
     for i in range(200):
-        path = tmp_path / f"file.{list(WRITERS)[i % 8]}"
+        path = tmp_path / f"file.{list(WRITERS)[i % len(WRITERS)]}"
         path.write_bytes(chance.randbytes(chance.choice([30, 100, 1000])))
         assert read_or_error(path) is None

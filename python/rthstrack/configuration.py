@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 import re
-import tomllib
-import typing
-from dataclasses import MISSING, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from rthstrack.errors import ConfigurationError
 from rthstrack.ground_motion import check_ground_motion
+from rthstrack.keyed_table import NUMBER, NUMBERS, SQUARE, Table, read_toml
 from rthstrack.virtual_test import (
     Actuator,
     BaberWen,
@@ -40,7 +38,7 @@ from rthstrack.virtual_test import (
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Mapping
 
 __all__ = ["Configuration", "configuration_from", "read_configuration", "to_table", "virtual_test_from"]
 
@@ -98,18 +96,7 @@ class Configuration(NamedTuple):
 def read_configuration(path: str | os.PathLike[str]) -> Configuration:
     """Reads and checks a TOML file. Raises ConfigurationError with every mistake in it, each with its key."""
     file = Path(path)
-    try:
-        table = tomllib.loads(file.read_bytes().decode("utf-8"))
-    except OSError as error:
-        raise ConfigurationError(file, [("", f"cannot be read: {error.strerror}")]) from None
-    except UnicodeDecodeError as error:
-        raise ConfigurationError(
-            file, [("", f"expected TOML in UTF-8, found byte {error.start} to be no text")]
-        ) from None
-    except RecursionError:
-        raise ConfigurationError(file, [("", "expected TOML, found it nested too deeply")]) from None
-    except ValueError as error:
-        raise ConfigurationError(file, [("", f"expected TOML: {error}")]) from None
+    table = read_toml(file)
     return configuration_from(table, file.parent, file)
 
 
@@ -120,7 +107,7 @@ def configuration_from(
 
     Raises ConfigurationError with every mistake, `file` before each.
     """
-    root = _Table(table, "", [])
+    root = Table(table, "", [])
     parts = _parts(root)
     ground_motion = root.table("ground_motion", required=True)
     if ground_motion is not None:
@@ -132,7 +119,7 @@ def configuration_from(
 
 def virtual_test_from(table: Mapping[str, Any], file: str | os.PathLike[str] = "") -> VirtualTest:
     """The test alone, whatever the table says of the ground motion. Raises ConfigurationError as above."""
-    root = _Table(table, "", [])
+    root = Table(table, "", [])
     parts = _parts(root)
     root.known.append("ground_motion")
     root.close()
@@ -170,173 +157,6 @@ def _plain(value: Any) -> Any:
     return value
 
 
-# Values ---------------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class _Kind:
-    """A kind of value: in words, and how it is read; None is what does not fit."""
-
-    expected: str
-    read: Callable[[Any], Any]
-
-
-def _number(value: Any) -> float | None:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return None
-    try:
-        number = float(value)
-    except OverflowError:
-        return None
-    return number if math.isfinite(number) else None
-
-
-def _whole(value: Any) -> int | None:
-    # What a float64 holds exactly is more than any count or seed needs.
-    return value if isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 1 << 53 else None
-
-
-def _many(read: Callable[[Any], Any], length: int | None = None) -> Callable[[Any], Any]:
-    def read_all(value: Any) -> tuple[Any, ...] | None:
-        if not isinstance(value, list | tuple) or not value or (length is not None and len(value) != length):
-            return None
-        found = tuple(read(one) for one in value)
-        return None if any(one is None for one in found) else found
-
-    return read_all
-
-
-def _matrix(value: Any) -> np.ndarray[Any, np.dtype[np.float64]] | None:
-    rows = _many(_many(_number))(value)
-    return np.array(rows) if rows and all(len(row) == len(rows) for row in rows) else None
-
-
-def _one_of(*choices: Any) -> _Kind:
-    def read(value: Any) -> Any:
-        return next((one for one in choices if type(value) is type(one) and value == one), None)
-
-    return _Kind(f"one of {', '.join(map(repr, choices))}", read)
-
-
-_NUMBER = _Kind("a finite number", _number)
-_NUMBERS = _Kind("a list of finite numbers", _many(_number))
-_SQUARE = _Kind("a square matrix, as a list of rows of finite numbers", _matrix)
-_KINDS: dict[Any, _Kind] = {
-    float: _NUMBER,
-    float | None: _NUMBER,
-    int: _Kind("a whole number from 0 on", _whole),
-    bool: _Kind("true or false", lambda value: value if isinstance(value, bool) else None),
-    tuple[float, ...]: _NUMBERS,
-    tuple[float, float]: _Kind("a list of two finite numbers", _many(_number, 2)),
-    tuple[int, int]: _Kind("a list of two whole numbers", _many(_whole, 2)),
-    Literal[1, 2, 3]: _one_of(1, 2, 3),
-    Literal["continuous", "cr"]: _one_of("continuous", "cr"),
-}
-# What stands in for a value that was wrong, so that the rest can be checked with it. A list has nothing that could.
-_STAND_INS: dict[Any, Any] = {float: 1.0, Literal[1, 2, 3]: 1}
-
-
-def _shown(value: Any) -> str:
-    if isinstance(value, dict):
-        return "a table"
-    if isinstance(value, bool):
-        return str(value).lower()
-    text = repr(value) if not isinstance(value, int) or abs(value) < 1 << 64 else "a number of too many digits"
-    return text if len(text) <= 60 else f"{text[:56]} ..."
-
-
-def _near(name: str, known: Iterable[str]) -> str:
-    near = difflib.get_close_matches(name, [one for one in known if one != name], n=2, cutoff=0.5)
-    return f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
-
-
-# Tables ---------------------------------------------------------------------------------------------------------------
-
-
-class _Table:
-    """One table, read key by key. Mistakes of all tables go to one list of (key, message), and reading goes on."""
-
-    def __init__(self, values: Mapping[str, Any], key: str, mistakes: list[tuple[str, str]]) -> None:
-        self.values = values
-        self.key = key
-        self.mistakes = mistakes
-        self.known: list[str] = []
-
-    def path(self, name: str) -> str:
-        """The key of one of this table's values, from the root."""
-        return f"{self.key}.{name}" if self.key else name
-
-    def note(self, name: str, message: str) -> None:
-        """A mistake in one of this table's values."""
-        self.mistakes.append((self.path(name), message))
-
-    def take(self, name: str, kind: _Kind, default: Any = MISSING, *, stand_in: Any = None) -> Any:
-        """The value of this name; where it is not there or wrong the default or, without one, what stands in for it."""
-        self.known.append(name)
-        fallback = stand_in if default is MISSING else default
-        if name not in self.values:
-            if default is MISSING:
-                self.note(name, f"missing: expected {kind.expected}")
-            return fallback
-        given = self.values[name]
-        value = kind.read(given)
-        if value is None:
-            near = _near(given, re.findall(r"'(\w+)'", kind.expected)) if isinstance(given, str) else ""
-            self.note(name, f"expected {kind.expected}, found {_shown(given)}{near}")
-        return fallback if value is None else value
-
-    def table(self, name: str, *, required: bool = False) -> _Table | None:
-        """The table of this name, None where there is none."""
-        self.known.append(name)
-        value = self.values.get(name)
-        if isinstance(value, dict):
-            return _Table(value, self.path(name), self.mistakes)
-        if name in self.values:
-            self.note(name, f"expected a table, found {_shown(value)}")
-        elif required:
-            self.note(name, "missing: expected a table")
-        return None
-
-    def tables(self, name: str) -> list[_Table]:
-        """The tables of an array of this name, numbered from 1."""
-        self.known.append(name)
-        value = self.values.get(name, [])
-        if isinstance(value, list) and all(isinstance(one, dict) for one in value):
-            return [_Table(one, f"{self.path(name)}[{i}]", self.mistakes) for i, one in enumerate(value, start=1)]
-        self.note(name, f"expected an array of tables, [[{self.path(name)}]], found {_shown(value)}")
-        return []
-
-    def fields(self, cls: type, *names: str) -> dict[str, Any]:
-        """The values of these fields of a dataclass (all, where none is named)."""
-        hints = typing.get_type_hints(cls)
-        return {
-            field.name: self.take(
-                field.name, _KINDS[hints[field.name]], field.default, stand_in=_STAND_INS.get(hints[field.name])
-            )
-            for field in dataclasses.fields(cls)
-            if field.name in names or not names
-        }
-
-    def made(self, cls: type) -> Any:
-        """A dataclass of this table's values. None if a list is wrong, for its values belong together."""
-        values = self.fields(cls)
-        self.close()
-        lacking = any(values[f.name] is None for f in dataclasses.fields(cls) if f.default is MISSING)
-        return None if lacking else cls(**values)
-
-    def one_of(self, tag: str, known: Mapping[str, type]) -> Any:
-        """A dataclass of the class that the value of `tag` names; None where it names none."""
-        name = self.take(tag, _one_of(*known))
-        return None if name is None else self.made(known[name])
-
-    def close(self, more: Iterable[str] = ()) -> None:
-        """Notes the keys that nobody asked for, nor is yet to ask for."""
-        self.known += more
-        for name in self.values:
-            if name not in self.known:
-                self.note(name, "no such key" + (_near(name, self.known) or f"; there are: {', '.join(self.known)}"))
-
-
 @dataclass(frozen=True, slots=True)
 class _Parts:
     """A test as far as it could be read; `n_dof` is known where the structure's size is, whatever else is wrong."""
@@ -349,10 +169,10 @@ class _Parts:
     duration_s: float | None
 
 
-def _parts(root: _Table) -> _Parts:
-    about = root.table("test") or _Table({}, "test", root.mistakes)
+def _parts(root: Table) -> _Parts:
+    about = root.table("test") or Table({}, "test", root.mistakes)
     settings = about.fields(VirtualTest, *_TEST)
-    duration_s = about.take("duration_s", _NUMBER, None)
+    duration_s = about.take("duration_s", NUMBER, None)
     if duration_s is not None and duration_s <= 0:
         about.note("duration_s", f"expected a positive number of seconds, found {duration_s:g}")
     if any(key == "test.stepping" for key, _ in about.mistakes):
@@ -366,7 +186,7 @@ def _parts(root: _Table) -> _Parts:
     return _Parts(structure, n_dof, elements, actuators, settings, duration_s)
 
 
-def _structure(table: _Table) -> tuple[Structure | None, int | None]:
+def _structure(table: Table) -> tuple[Structure | None, int | None]:
     """The structure, None where it cannot be made, and how many degrees of freedom it has or would have."""
     values = table.values
     single, storeys, matrices = _FORMS
@@ -390,13 +210,13 @@ def _structure(table: _Table) -> tuple[Structure | None, int | None]:
     given: tuple[Any, ...]
     if found[0] == single:
         make, n_dof = Structure.sdof, 1
-        given = (table.take(first, _NUMBER, stand_in=1.0), table.take("damping_ratio", _NUMBER, stand_in=0.0))
-        given += (table.take(second, _NUMBER, 1000.0),)
+        given = (table.take(first, NUMBER, stand_in=1.0), table.take("damping_ratio", NUMBER, stand_in=0.0))
+        given += (table.take(second, NUMBER, 1000.0),)
     else:
-        kind = _NUMBERS if found[0] == storeys else _SQUARE
+        kind = NUMBERS if found[0] == storeys else SQUARE
         both = table.take(first, kind), table.take(second, kind)
         damping = _damping(table)
-        influence = table.take("influence", _NUMBERS, None) if found[0] == matrices else None
+        influence = table.take("influence", NUMBERS, None) if found[0] == matrices else None
         n_dof = next((len(one) for one in both if one is not None), 0)
         if not n_dof:
             return None, None
@@ -412,7 +232,7 @@ def _structure(table: _Table) -> tuple[Structure | None, int | None]:
     return (structure if len(table.mistakes) == n_mistakes else None), n_dof
 
 
-def _damping(table: _Table) -> Any:
+def _damping(table: Table) -> Any:
     """ModalDamping, RayleighDamping or a matrix, whichever one the table names; no damping where it is wrong."""
     names = ("damping_ratio", "damping_ratios", "rayleigh", "damping_n_s_per_m")
     found = [name for name in names if name in table.values]
@@ -425,20 +245,20 @@ def _damping(table: _Table) -> Any:
         if made is not None:
             return made
     elif found[0] == "damping_n_s_per_m":
-        matrix = table.take(found[0], _SQUARE)
+        matrix = table.take(found[0], SQUARE)
         if matrix is not None:
             return matrix
     else:
-        return ModalDamping(table.take(found[0], _NUMBER if found[0] == "damping_ratio" else _NUMBERS, stand_in=0.0))
+        return ModalDamping(table.take(found[0], NUMBER if found[0] == "damping_ratio" else NUMBERS, stand_in=0.0))
     return ModalDamping(0.0)
 
 
-def _element(table: _Table) -> Element:
+def _element(table: Table) -> Element:
     places = table.fields(Element, "dof", "from_dof", "part_of_structure")
     return Element(table.one_of("law", _LAWS) or Spring(), **places)
 
 
-def _actuator(table: _Table) -> Actuator:
+def _actuator(table: Table) -> Actuator:
     nested = ("specimen", "delay_s", "dynamics", "compensation", *_CONVERTERS)
     values = table.fields(Actuator, *(f.name for f in dataclasses.fields(Actuator) if f.name not in nested))
     several = isinstance(table.values.get("specimen"), list)
@@ -448,7 +268,7 @@ def _actuator(table: _Table) -> Actuator:
         history = table.table("delay_s")
         values["delay_s"] = (history and history.made(DelayHistory)) or 0.0
     else:
-        values["delay_s"] = table.take("delay_s", _NUMBER, 0.0)
+        values["delay_s"] = table.take("delay_s", NUMBER, 0.0)
     for name, known in (("dynamics", _DYNAMICS), ("compensation", _COMPENSATIONS)):
         one = table.table(name)
         values[name] = one and one.one_of("kind", known)
@@ -462,7 +282,7 @@ def _actuator(table: _Table) -> Actuator:
 # The whole ------------------------------------------------------------------------------------------------------------
 
 
-def _checked(parts: _Parts, root: _Table, file: str | os.PathLike[str]) -> VirtualTest:
+def _checked(parts: _Parts, root: Table, file: str | os.PathLike[str]) -> VirtualTest:
     """The test, if neither reading nor `check` found a mistake; else ConfigurationError with all of them."""
     test = VirtualTest(parts.structure or _stand_in(parts), parts.actuators, parts.elements, **parts.settings)
     noted = {key for key, _ in root.mistakes}

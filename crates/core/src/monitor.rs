@@ -20,6 +20,8 @@ use crate::window::{Detrend, Window};
 
 /// Samples after decimation that the windows of all actuators may hold.
 const MAX_SAMPLES: f64 = 4_194_304.0;
+/// P times the number of actuators: some 500 bytes each.
+const MAX_DECIMATION: usize = 262_144;
 
 /// The user's numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -167,12 +169,18 @@ impl Monitor {
     /// a band that the decimator does not keep; whatever [`Evaluator::new`] refuses.
     pub fn new(config: MonitorConfig) -> Result<Self> {
         check_rate(config.rate_hz)?;
-        let decimator = CausalDecimator::new(config.data_decimation)?;
-        let rate_hz = config.rate_hz / config.data_decimation as f64;
         let setting = |name, expected: String, found| Err(Error::Setting { name, expected, found });
         if config.n_actuators == 0 {
             return setting("n_actuators", "at least 1".to_owned(), 0.0);
         }
+        // The filters of all actuators must fit into memory, too.
+        let most = MAX_DECIMATION / config.n_actuators.min(MAX_DECIMATION);
+        if config.data_decimation > most {
+            let expected = format!("at most {most} with {} actuators", config.n_actuators);
+            return setting("data_decimation", expected, config.data_decimation as f64);
+        }
+        let decimator = CausalDecimator::new(config.data_decimation)?;
+        let rate_hz = config.rate_hz / config.data_decimation as f64;
         let samples = (config.window_s * rate_hz).round();
         let most = MAX_SAMPLES / config.n_actuators as f64;
         if !(samples >= MIN_SAMPLES as f64 && samples <= most) {

@@ -182,9 +182,10 @@ fn drift_after(n: usize, estimator: Estimator) {
 
 #[test]
 fn nothing_drifts() {
-    let n = std::env::var("RTHSTRACK_SOAK").map_or(1 << 20, |n| n.parse().unwrap());
-    drift_after(n, Estimator::Fei);
-    drift_after(n / 4, Estimator::LeastSquares);
+    let n: usize = std::env::var("RTHSTRACK_SOAK").map_or(1 << 20, |n| n.parse().unwrap());
+    // Whole periods of the signals.
+    drift_after(n.next_multiple_of(4096), Estimator::Fei);
+    drift_after((n / 4).next_multiple_of(4096), Estimator::LeastSquares);
 }
 
 #[test]

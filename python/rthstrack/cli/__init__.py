@@ -8,7 +8,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from rthstrack._core import __version__
-from rthstrack.cli import channels, evaluate, reproduce, simulate, study
+from rthstrack.cli import channels, evaluate, monitor, replay, reproduce, simulate, study
 from rthstrack.errors import RthstrackError, SettingError
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--version", action="version", version=f"rthstrack {__version__}")
     subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for command in (simulate, evaluate, channels, study, reproduce):
+    for command in (simulate, evaluate, channels, study, monitor, replay, reproduce):
         command.add_parser(subparsers)
     args = parser.parse_args(argv)
     try:

@@ -22,9 +22,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "channels",
         help="list what is in a file: channels, units, sampling rate, likely target and measured",
-        description="Lists the channels of recorded files (text, MATLAB, HDF5, TDMS, Parquet, NumPy), their units, "
-        "ranges and missing samples, the sampling rate and where it comes from, and the likely target/measured pair. "
-        "Exit status: 0 all files were read, 1 some file could not be read, 2 misuse.",
+        description="Lists the channels of recorded files (text, MATLAB, HDF5, TDMS, Parquet, Arrow, NumPy), their "
+        "units, ranges and missing samples, the sampling rate and where it comes from, and the likely "
+        "target/measured pair. Exit status: 0 all files were read, 1 some file could not be read, 2 misuse.",
     )
     parser.add_argument("files", nargs="+", metavar="FILE", help="file to list")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")

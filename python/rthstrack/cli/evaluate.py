@@ -45,7 +45,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "Exit status: 0 everything was evaluated, 1 some file failed, 2 misuse, 3 a limit was exceeded.",
     )
     parser.add_argument(
-        "files", nargs="+", metavar="FILE", help="recorded test: text, MATLAB, HDF5, TDMS, Parquet, NumPy"
+        "files", nargs="+", metavar="FILE", help="recorded test: text, MATLAB, HDF5, TDMS, Parquet, Arrow, NumPy"
     )
     signals = add_signals(parser, "signals (a channel is named by name, path or #index)")
     signals.add_argument("--command", action="append", metavar="C", help="what compensation sends: judged apart")

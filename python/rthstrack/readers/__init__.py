@@ -26,6 +26,8 @@ _ENDINGS = {
     "HDF5": (".h5", ".hdf5", ".hdf", ".he5"),
     "TDMS": (".tdms",),
     "Parquet": (".parquet", ".pq"),
+    "Arrow stream": (".arrows", ".arrow"),
+    "Arrow file": (".arrow", ".feather"),
     "NumPy npy": (".npy",),
     "NumPy npz": (".npz",),
 }
@@ -35,6 +37,7 @@ _OTHERS = (
     (b"\x1f\x8b", "a gzip archive; unpack it first"),
     (b"TDSh", "the index of a TDMS file; give the .tdms file beside it"),
     (b"7z\xbc\xaf", "a 7z archive; unpack it first"),
+    (b"FEA1", "a Feather file of version 1; save it as version 2 or as Parquet"),
     (b"%PDF", "a PDF document"),
     (b"\x89PNG", "a picture"),
 )
@@ -133,7 +136,7 @@ def _reader(file: Path) -> tuple[str, Callable[[Path], Contents]]:
         signed_later = _hdf5_behind_a_block(opened.seek, opened.read)
     for magic, what in _OTHERS:
         if head.startswith(magic):
-            raise RecordingError(f"{what}; expected text, MATLAB, HDF5, TDMS, Parquet or NumPy")
+            raise RecordingError(f"{what}; expected text, MATLAB, HDF5, TDMS, Parquet, Arrow or NumPy")
     if head.startswith(b"\x89HDF\r\n\x1a\n") or signed_later:
         if head.startswith(b"MATLAB 7"):
             from rthstrack.readers import mat73
@@ -156,6 +159,10 @@ def _reader(file: Path) -> tuple[str, Callable[[Path], Contents]]:
         from rthstrack.readers import parquet
 
         return "Parquet", parquet.read
+    if head.startswith((b"ARROW1\0\0", b"\xff\xff\xff\xff")):
+        from rthstrack.readers import arrow
+
+        return "Arrow file" if head.startswith(b"ARROW1") else "Arrow stream", arrow.read
     if head.startswith((b"PK\x03\x04", b"PK\x05\x06")):
         from rthstrack.readers import numpy_file
 

@@ -316,7 +316,7 @@ impl Alignment {
         self.place_target(state, view, start, &support, lag);
         self.kept.spectrum.transform_one(&mut state.scratch, &state.signals.measured, None, &mut state.bins[MEASURED]);
         let products = self.products_in_bins(state);
-        let Some(score) = self.score(&products, &Taps::at(fraction(lag).1), &state.weighting.correlation) else {
+        let Some(score) = self.score(&products, lag, &state.weighting.correlation) else {
             return;
         };
         let within = support.start - start..support.end - start;
@@ -455,8 +455,7 @@ impl Alignment {
             self.place_target(state, view, start, support, now);
             let products =
                 if in_bins { self.products_in_bins(state) } else { self.products_in_time(state, start, support) };
-            let taps = Taps::at(fraction(now).1);
-            let Some(score) = self.score(&products, &taps, &state.weighting.correlation) else {
+            let Some(score) = self.score(&products, now, &state.weighting.correlation) else {
                 return Err(Reason::NoConvergence);
             };
             if score.value > 0.0 {
@@ -581,13 +580,14 @@ impl Alignment {
         }
     }
 
-    /// The derivative of the objective with respect to the delay, up to a positive factor, at the best gain.
-    fn score(&self, p: &Products, taps: &Taps, correlation: &[f64; NODES]) -> Option<Score> {
+    /// The derivative of the objective with respect to the delay, up to a positive factor, at `tau` and the best gain.
+    fn score(&self, p: &Products, tau: f64, correlation: &[f64; NODES]) -> Option<Score> {
         let correlate = |a: &[f64; NODES], b: &[f64; NODES]| -> f64 {
             let terms = (0..NODES).flat_map(|i| (0..NODES).map(move |j| (i, j)));
             terms.map(|(i, j)| a[i] * b[j] * correlation[i.abs_diff(j)]).sum()
         };
-        let (gain, noise, share) = if self.noise_ratio > 0.0 {
+        let taps = (self.noise_ratio > 0.0).then(|| Taps::at(fraction(tau).1));
+        let (gain, noise, share) = if let Some(taps) = &taps {
             // Noise variances of measured over target; what interpolation leaves of the latter.
             let lambda = 1.0 / (self.noise_ratio * self.noise_ratio);
             let g = correlate(&taps.value, &taps.value);
@@ -606,7 +606,9 @@ impl Alignment {
         };
         let mut clean = *p;
         let mut pull = 0.0;
-        if noise > 0.0 {
+        if let Some(taps) = &taps
+            && noise > 0.0
+        {
             let cross = correlate(&taps.value, &taps.slope);
             clean.yy -= noise * share;
             clean.yv -= noise * cross;

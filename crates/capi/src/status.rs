@@ -1,0 +1,265 @@
+//! What a call answers, and why a reading has no numbers: fixed numbers with texts.
+
+use std::ffi::{CStr, c_char};
+
+use rthstrack::Reason;
+
+/// What a call answers.
+#[repr(i32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum rthstrack_status {
+    /// Done.
+    RTHSTRACK_OK = 0,
+    /// A pointer is null, or not aligned as its type asks for. Nothing was done.
+    RTHSTRACK_BAD_POINTER = 1,
+    /// The program was compiled with a header of another interface than the library's, or the settings were not
+    /// filled by rthstrack_monitor_config_default. Nothing was done.
+    RTHSTRACK_ABI_MISMATCH = 2,
+    /// A setting is refused; `message` says which, what it must be and what it was. Nothing was made.
+    RTHSTRACK_BAD_SETTING = 3,
+    /// `readings` has no room for the readings of a window, one an actuator. The samples from there on were not taken.
+    RTHSTRACK_NO_ROOM = 4,
+    /// A block has more samples than memory can hold. Nothing was taken.
+    RTHSTRACK_BAD_LENGTH = 5,
+    /// A command is NaN or infinite. Nothing was moved.
+    RTHSTRACK_NOT_FINITE = 6,
+    /// A mistake in the library, which says where on standard error. The object refuses all further steps until it is
+    /// restarted; what the call was to write may be unwritten.
+    RTHSTRACK_PANIC = 7,
+}
+
+use rthstrack_status as Status;
+
+impl Status {
+    pub(crate) const ALL: [Status; 8] = [
+        Status::RTHSTRACK_OK,
+        Status::RTHSTRACK_BAD_POINTER,
+        Status::RTHSTRACK_ABI_MISMATCH,
+        Status::RTHSTRACK_BAD_SETTING,
+        Status::RTHSTRACK_NO_ROOM,
+        Status::RTHSTRACK_BAD_LENGTH,
+        Status::RTHSTRACK_NOT_FINITE,
+        Status::RTHSTRACK_PANIC,
+    ];
+
+    fn text(self) -> &'static CStr {
+        match self {
+            Status::RTHSTRACK_OK => c"done",
+            Status::RTHSTRACK_BAD_POINTER => c"a pointer is null or not aligned",
+            Status::RTHSTRACK_ABI_MISMATCH => {
+                c"program and library do not fit together: compile the program with the library's own rthstrack.h, and \
+                  fill the settings by rthstrack_monitor_config_default"
+            }
+            Status::RTHSTRACK_BAD_SETTING => c"a setting is refused",
+            Status::RTHSTRACK_NO_ROOM => c"no room for the readings: one an actuator is needed for every window",
+            Status::RTHSTRACK_BAD_LENGTH => c"more samples than memory can hold",
+            Status::RTHSTRACK_NOT_FINITE => c"a command is NaN or infinite",
+            Status::RTHSTRACK_PANIC => c"a mistake in the library; restart or destroy the object, and report it",
+        }
+    }
+}
+
+/// Why a reading has no numbers, or no intervals.
+#[repr(i32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum rthstrack_reason {
+    /// Nothing is missing, unless the estimator gives no intervals.
+    RTHSTRACK_REASON_NONE = 0,
+    /// The target moves too little in the window, or one signal not at all.
+    RTHSTRACK_REASON_STILL = 1,
+    /// The window holds samples that are NaN or infinite.
+    RTHSTRACK_REASON_NOT_FINITE = 2,
+    /// Magnitudes leave the range of double precision.
+    RTHSTRACK_REASON_RANGE = 3,
+    /// Too few samples are left for which the shifted target is known: `reason_values[0]` of them.
+    RTHSTRACK_REASON_TOO_SHORT = 4,
+    /// The target goes through too little of a cycle: `reason_values[0]` cycles.
+    RTHSTRACK_REASON_FEW_CYCLES = 5,
+    /// Too little of measured follows the target: the share `reason_values[0]`.
+    RTHSTRACK_REASON_LOW_COHERENCE = 6,
+    /// Noise leaves the delay uncertain by more than half a turn: `reason_values[0]` seconds either way.
+    RTHSTRACK_REASON_UNCERTAIN = 7,
+    /// Two delays fit equally well: `reason_values`, in seconds.
+    RTHSTRACK_REASON_AMBIGUOUS = 8,
+    /// The best delay lies beyond `reason_values[0]` seconds, the largest taken.
+    RTHSTRACK_REASON_BEYOND_MAX_DELAY = 9,
+    /// Measured moves against the target.
+    RTHSTRACK_REASON_OPPOSITE_SIGN = 10,
+    /// The iteration did not settle on a delay.
+    RTHSTRACK_REASON_NO_CONVERGENCE = 11,
+    /// Another reason without numbers.
+    RTHSTRACK_REASON_OTHER = 99,
+    /// No interval: the residual follows the target with coherence `reason_values[0]`.
+    RTHSTRACK_REASON_RESIDUAL_FOLLOWS_TARGET = 100,
+    /// No interval: too few frequency bins to know the noise by.
+    RTHSTRACK_REASON_FEW_BINS = 101,
+    /// No interval: it is known for weight power 2 only.
+    RTHSTRACK_REASON_WEIGHT_POWER = 102,
+}
+
+use rthstrack_reason as Code;
+
+impl Code {
+    const ALL: [Code; 16] = [
+        Code::RTHSTRACK_REASON_NONE,
+        Code::RTHSTRACK_REASON_STILL,
+        Code::RTHSTRACK_REASON_NOT_FINITE,
+        Code::RTHSTRACK_REASON_RANGE,
+        Code::RTHSTRACK_REASON_TOO_SHORT,
+        Code::RTHSTRACK_REASON_FEW_CYCLES,
+        Code::RTHSTRACK_REASON_LOW_COHERENCE,
+        Code::RTHSTRACK_REASON_UNCERTAIN,
+        Code::RTHSTRACK_REASON_AMBIGUOUS,
+        Code::RTHSTRACK_REASON_BEYOND_MAX_DELAY,
+        Code::RTHSTRACK_REASON_OPPOSITE_SIGN,
+        Code::RTHSTRACK_REASON_NO_CONVERGENCE,
+        Code::RTHSTRACK_REASON_OTHER,
+        Code::RTHSTRACK_REASON_RESIDUAL_FOLLOWS_TARGET,
+        Code::RTHSTRACK_REASON_FEW_BINS,
+        Code::RTHSTRACK_REASON_WEIGHT_POWER,
+    ];
+
+    /// The code, and what the reason says in numbers; NaN where it says none.
+    pub(crate) fn of(reason: Option<Reason>) -> (Code, [f64; 2]) {
+        let plain = |code| (code, [f64::NAN; 2]);
+        let with = |code, value| (code, [value, f64::NAN]);
+        match reason {
+            None => plain(Code::RTHSTRACK_REASON_NONE),
+            Some(Reason::Still) => plain(Code::RTHSTRACK_REASON_STILL),
+            Some(Reason::NotFinite) => plain(Code::RTHSTRACK_REASON_NOT_FINITE),
+            Some(Reason::Range) => plain(Code::RTHSTRACK_REASON_RANGE),
+            Some(Reason::TooShort { n_samples }) => with(Code::RTHSTRACK_REASON_TOO_SHORT, n_samples as f64),
+            Some(Reason::FewCycles { found }) => with(Code::RTHSTRACK_REASON_FEW_CYCLES, found),
+            Some(Reason::LowCoherence { goodness }) => with(Code::RTHSTRACK_REASON_LOW_COHERENCE, goodness),
+            Some(Reason::Uncertain { reach_s }) => with(Code::RTHSTRACK_REASON_UNCERTAIN, reach_s),
+            Some(Reason::Ambiguous { delay_s, other_s }) => (Code::RTHSTRACK_REASON_AMBIGUOUS, [delay_s, other_s]),
+            Some(Reason::BeyondMaxDelay { max_delay_s }) => with(Code::RTHSTRACK_REASON_BEYOND_MAX_DELAY, max_delay_s),
+            Some(Reason::OppositeSign) => plain(Code::RTHSTRACK_REASON_OPPOSITE_SIGN),
+            Some(Reason::NoConvergence) => plain(Code::RTHSTRACK_REASON_NO_CONVERGENCE),
+            Some(Reason::ResidualFollowsTarget { coherence }) => {
+                with(Code::RTHSTRACK_REASON_RESIDUAL_FOLLOWS_TARGET, coherence)
+            }
+            Some(Reason::FewBins) => plain(Code::RTHSTRACK_REASON_FEW_BINS),
+            Some(Reason::WeightPower) => plain(Code::RTHSTRACK_REASON_WEIGHT_POWER),
+            Some(_) => plain(Code::RTHSTRACK_REASON_OTHER),
+        }
+    }
+
+    fn text(self) -> &'static CStr {
+        match self {
+            Code::RTHSTRACK_REASON_NONE => c"nothing is missing",
+            Code::RTHSTRACK_REASON_STILL => c"not determined: too little motion to judge by",
+            Code::RTHSTRACK_REASON_NOT_FINITE => c"not determined: the window holds samples that are NaN or infinite",
+            Code::RTHSTRACK_REASON_RANGE => {
+                c"not determined: magnitudes leave the range of double precision; scale the signals to a usual unit"
+            }
+            Code::RTHSTRACK_REASON_TOO_SHORT => {
+                c"not determined: too few samples are left for which the shifted target is known; lower max_delay_s or \
+                  take a longer window"
+            }
+            Code::RTHSTRACK_REASON_FEW_CYCLES => {
+                c"not determined: target goes through too little of a cycle, at least 0.6 is needed; take a longer \
+                  window"
+            }
+            Code::RTHSTRACK_REASON_LOW_COHERENCE => {
+                c"not determined: too little of measured follows target; is this the right pair?"
+            }
+            Code::RTHSTRACK_REASON_UNCERTAIN => {
+                c"not determined: noise leaves the delay uncertain by more than half a turn; take a longer window or a \
+                  band with less noise"
+            }
+            Code::RTHSTRACK_REASON_AMBIGUOUS => {
+                c"not determined: ambiguous, two delays fit equally well; lower max_delay_s below half their \
+                  distance to choose the one near zero"
+            }
+            Code::RTHSTRACK_REASON_BEYOND_MAX_DELAY => {
+                c"not determined: the best delay lies beyond max_delay_s, or beyond a quarter of the window; raise it \
+                  or take a longer window"
+            }
+            Code::RTHSTRACK_REASON_OPPOSITE_SIGN => {
+                c"not determined: measured moves against target; does one of them have the opposite sign?"
+            }
+            Code::RTHSTRACK_REASON_NO_CONVERGENCE => c"not determined: the iteration did not settle on a delay",
+            Code::RTHSTRACK_REASON_OTHER => c"not determined",
+            Code::RTHSTRACK_REASON_RESIDUAL_FOLLOWS_TARGET => {
+                c"no interval: what one gain and one delay leave still follows target, so they are not constant over \
+                  frequency or time"
+            }
+            Code::RTHSTRACK_REASON_FEW_BINS => c"no interval: too few frequency bins to know the noise by",
+            Code::RTHSTRACK_REASON_WEIGHT_POWER => c"no interval: it is known for weight power 2 only",
+        }
+    }
+}
+
+/// One line for a status. The text is the library's and lives as long as it; never null.
+///
+/// Any thread; real-time safe.
+#[unsafe(no_mangle)]
+pub extern "C" fn rthstrack_status_text(status: i32) -> *const c_char {
+    let known = Status::ALL.into_iter().find(|s| *s as i32 == status);
+    known.map_or(c"unknown status", Status::text).as_ptr()
+}
+
+/// One line for the reason of a reading. The text is the library's and lives as long as it; never null.
+///
+/// Any thread; real-time safe.
+#[unsafe(no_mangle)]
+pub extern "C" fn rthstrack_reason_text(reason: i32) -> *const c_char {
+    let known = Code::ALL.into_iter().find(|r| *r as i32 == reason);
+    known.map_or(c"unknown reason", Code::text).as_ptr()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_of_reasons_begin_as_those_of_the_core_do() {
+        let reasons = [
+            Reason::Still,
+            Reason::NotFinite,
+            Reason::Range,
+            Reason::TooShort { n_samples: 3 },
+            Reason::FewCycles { found: 0.5 },
+            Reason::LowCoherence { goodness: 0.25 },
+            Reason::Uncertain { reach_s: 0.125 },
+            Reason::Ambiguous { delay_s: 0.5, other_s: 0.75 },
+            Reason::BeyondMaxDelay { max_delay_s: 0.25 },
+            Reason::OppositeSign,
+            Reason::NoConvergence,
+            Reason::ResidualFollowsTarget { coherence: 0.5 },
+            Reason::FewBins,
+            Reason::WeightPower,
+        ];
+        for reason in reasons {
+            let (code, _) = Code::of(Some(reason));
+            let (text, core) = (code.text().to_str().unwrap(), reason.to_string());
+            let length = text.find(|c| ";,?".contains(c)).unwrap_or(text.len());
+            let undetermined = text.starts_with("not determined: ");
+            assert_eq!(undetermined, reason.is_undetermined(), "{reason:?}");
+            assert_eq!(undetermined, core.starts_with("not determined: "), "{reason:?}");
+            // Numbers stand in the middle of some texts.
+            let end = text[..length].rsplit(' ').next().unwrap();
+            assert!(core.contains(end), "{reason:?}: {text}; {core}");
+            assert_ne!(code, Code::RTHSTRACK_REASON_OTHER);
+        }
+    }
+
+    #[test]
+    fn numbers_of_a_reason_go_with_its_code() {
+        let (code, values) = Code::of(Some(Reason::Ambiguous { delay_s: 0.5, other_s: 0.75 }));
+        assert_eq!((code, values), (Code::RTHSTRACK_REASON_AMBIGUOUS, [0.5, 0.75]));
+        let (code, values) = Code::of(Some(Reason::TooShort { n_samples: 3 }));
+        assert_eq!((code, values[0], values[1].is_nan()), (Code::RTHSTRACK_REASON_TOO_SHORT, 3.0, true));
+    }
+
+    #[test]
+    fn codes_and_statuses_are_all_listed_once() {
+        let distinct = |mut numbers: Vec<i32>| {
+            numbers.sort_unstable();
+            numbers.windows(2).all(|n| n[0] < n[1])
+        };
+        assert!(distinct(Status::ALL.iter().map(|s| *s as i32).collect()));
+        assert!(distinct(Code::ALL.iter().map(|r| *r as i32).collect()));
+    }
+}

@@ -1,0 +1,242 @@
+"""`rthstrack monitor`: gain and delay of every actuator while the test runs, with alarms."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import sys
+import time
+from typing import TYPE_CHECKING, Any
+
+from rthstrack import _core
+from rthstrack.cli import addresses
+from rthstrack.cli.monitor_options import Plan, add_options, checked_plan
+from rthstrack.cli.running import Ended, say
+from rthstrack.errors import RthstrackError, SettingError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from rthstrack._core import Live
+    from rthstrack.live.log import Log
+
+ALARM = 3
+_SUMMARY = ("received", "lost", "repeated", "reordered", "malformed", "readings", "alarms")
+_IN_WORDS = {
+    "filled": "samples filled by a straight line",
+    "restarts": "restarts of the window",
+    "refused": "datagrams of senders that are not allowed",
+    "log_dropped": "samples or readings that the log could not take",
+    "not_written": "readings that the file could not take",
+    "unsent": "datagrams that could not be sent",
+}
+# The status is looked at so often.
+_PERIOD_S = 0.1
+
+_DESCRIPTION = """\
+Evaluates a running test in moving windows: amplitude and delay of every actuator, alarms, a log, a
+table in this terminal, a live page. Samples come as UDP datagrams, by default little-endian
+doubles counter, target_1, measured_1, target_2, ..., or as lines (CSV or JSON) on standard input.
+A positive delay means that measured lags. Alarms are advisory: they stop nothing.
+"""
+_EPILOG = """\
+Exit status: 0 done (SIGINT and SIGTERM end it too), 1 a port is taken, the pace contradicts --rate
+or a file cannot be written, 2 misuse or a mistake in the layout, 3 an alarm with --exit-on-alarm.
+At exit one line of JSON tells what was received, lost, repeated, reordered, malformed, and how
+many readings and alarms there were.
+"""
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Adds the command to the command line."""
+    parser = subparsers.add_parser(
+        "monitor",
+        help="gain and delay while the test runs, with alarms, a log and a live page",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    wrong: dict[str, str] = {}
+    add_options(parser, wrong)
+    parser.set_defaults(run=lambda args: run(args, wrong))
+
+
+def run(args: argparse.Namespace, wrong: Mapping[str, str]) -> int:
+    """Monitors until the end of the input, of the duration or of the user's patience; returns the exit status."""
+    plan = checked_plan(args, wrong)
+    with Ended() as ended:
+        try:
+            live = _core.Live(plan.monitor, plan.source, plan.alarms, plan.outputs)
+        except OSError as error:
+            raise RthstrackError(_line(error)) from None
+        _monitored(args, plan, live, ended)
+        summary = live.summary()
+        print(json.dumps({"summary": {name: int(summary[name]) for name in _SUMMARY}}), flush=True)
+        others = [f"{summary[name]} {words}" for name, words in _IN_WORDS.items() if summary.get(name)]
+        if others:
+            say(", ".join(others))
+    fatal = live.fatal()
+    if fatal is not None:
+        raise RthstrackError(fatal)
+    return ALARM if args.exit_on_alarm and live.alarmed() else 0
+
+
+def _monitored(args: argparse.Namespace, plan: Plan, live: Live, ended: Ended) -> None:
+    """The run from start to end, with log and page around it, all of them closed."""
+    with contextlib.ExitStack() as cleanup:
+        # Whatever fails on the way; once more below, for the order.
+        cleanup.callback(live.stop)
+        page = None
+        if args.page is not None:
+            page = _page(live, args.page, args.page_host or "127.0.0.1")
+            cleanup.callback(page.stop)
+        log = _log(args, plan, live)
+        if log is not None:
+            cleanup.callback(log.stop)
+        # What is called last goes first: the input ends, the log takes what is left, then the page.
+        cleanup.callback(live.stop)
+        live.start()
+        if log is not None:
+            log.start()
+        if page is not None:
+            page.start()
+        about = _about(plan, live)
+        if not args.quiet:
+            for line in (f"{about}; Ctrl-C ends", *_addresses(args, plan, live, page)):
+                say(line)
+        _watch(args, plan, live, ended, about)
+
+
+def _log(args: argparse.Namespace, plan: Plan, live: Live) -> Log | None:
+    if args.log is None:
+        return None
+    from rthstrack.live.log import Log
+
+    try:
+        return Log(
+            live,
+            args.log,
+            rate_hz=plan.monitor["rate_hz"],
+            units=plan.layout.units,
+            settings=plan.settings(),
+            say=say,
+        )
+    except OSError as error:
+        name = error.filename or args.log
+        raise RthstrackError(
+            f"--log: {name}: cannot be written: {error.strerror or error}; choose another name"
+        ) from None
+
+
+def _page(live: Live, port: int, host: str) -> Any:
+    from rthstrack.live.page import Page  # type: ignore[import-not-found, unused-ignore]
+
+    try:
+        return Page(live, port, host)
+    except SettingError as error:
+        # A port that is taken is no misuse.
+        raise RthstrackError(f"--page: {error}") from None
+
+
+def _watch(args: argparse.Namespace, plan: Plan, live: Live, ended: Ended, about: str) -> None:
+    """Shows what happens until the run ends, and ends it."""
+    news = _News(plan.layout.names)
+    stream = sys.stdout if sys.stdout.isatty() else sys.stderr
+    end = time.monotonic() + (args.duration or float("inf"))
+    viewed: list[str] = []
+    if args.view or (stream is sys.stdout and not args.quiet):
+        from rthstrack.live.view import View
+
+        with View(stream, about, plan.layout.names) as view:
+            for status in _statuses(args, live, ended, end):
+                fresh = list(news.of(status))
+                viewed += [text for text, is_alarm in fresh if is_alarm]
+                try:
+                    view.draw(status, [text for text, _ in fresh])
+                except OSError:
+                    # The terminal is gone, the test is not.
+                    break
+                pressed = view.keys()
+                if "r" in pressed:
+                    live.reset()
+                ended.asked |= "q" in pressed
+    # The view is gone, and with it what it said.
+    for line in viewed:
+        say(line)
+    for status in _statuses(args, live, ended, end):
+        for text, is_alarm in news.of(status):
+            if is_alarm or not args.quiet:
+                say(text)
+
+
+def _statuses(args: argparse.Namespace, live: Live, ended: Ended, end: float) -> Iterator[dict[str, Any]]:
+    """How all stands, ten times a second until the run ends, and once more when it has been ended."""
+    over = False
+    while not over:
+        over = live.wait(max(0.0, min(_PERIOD_S, end - time.monotonic()))) or time.monotonic() >= end
+        over |= ended.asked or (args.exit_on_alarm and live.alarmed())
+        yield json.loads(live.status())
+    live.stop()
+    yield json.loads(live.status())
+
+
+class _News:
+    """The events of a status that were not in the last one."""
+
+    def __init__(self, names: tuple[str, ...]) -> None:
+        self._names = names
+        self._known: dict[tuple[Any, str], None] = {}
+
+    def of(self, status: Mapping[str, Any]) -> Iterator[tuple[str, bool]]:
+        """Lines, and whether each is an alarm's."""
+        from rthstrack.live.view import named
+
+        for event in status["events"]:
+            key = (event["time_s"], event["text"])
+            # What the log says of itself is told where it happens.
+            if key in self._known or event["text"].startswith("log: "):
+                continue
+            self._known[key] = None
+            is_alarm = event["text"].startswith("advisory")
+            raised = is_alarm and not event["text"].endswith(" is over")
+            yield f"{'ALARM ' if raised else ''}{_at(event['time_s'])}{named(event['text'], self._names)}", is_alarm
+        # A status has recent events only; so many are enough to know them by.
+        while len(self._known) > 1024:
+            del self._known[next(iter(self._known))]
+
+
+def _at(time_s: float | None) -> str:
+    return "" if time_s is None else f"at {time_s:.2f} s: "
+
+
+def _about(plan: Plan, live: Live) -> str:
+    """The run in a line."""
+    monitor = plan.monitor
+    source = f"udp {live.address()}" if plan.source["kind"] == "udp" else "lines on standard input"
+    low, high = monitor["band_hz"]
+    n = monitor["n_actuators"]
+    return (
+        f"monitoring {source}: {n} actuator{'s' * (n > 1)} at {monitor['rate_hz']:g} Hz, window "
+        f"{monitor['window_s']:g} s, {monitor['update_hz']:g} readings a second, "
+        f"{low:g} to {high:g} Hz (P = {monitor['data_decimation']}), {monitor['estimator']}"
+    )
+
+
+def _addresses(args: argparse.Namespace, plan: Plan, live: Live, page: Any) -> Iterator[str]:
+    if plan.source["kind"] == "udp" and not addresses.is_loopback(args.listen) and args.allow is None:
+        yield f"any machine that reaches {live.address()} may send samples: --allow SENDER names those that may"
+    if page is not None:
+        yield f"live page: {page.url}"
+        if not addresses.is_loopback(args.page_host or "127.0.0.1"):
+            yield f"the page is open to every machine that reaches {args.page_host}"
+    if args.control is not None:
+        yield f"a datagram 'reset' to udp://{live.control_address()} resets alarms"
+    if args.log is not None:
+        yield f"log: {args.log}"
+
+
+def _line(error: OSError) -> str:
+    named = f"{error.filename}: " if error.filename else ""
+    text = named + (error.strerror or str(error) or repr(error))
+    return " ".join(text.splitlines())

@@ -1,0 +1,359 @@
+"""The options of `rthstrack monitor`, checked: all mistakes at once."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rthstrack.cli import addresses
+from rthstrack.cli.arguments import ESTIMATORS, count, not_negative, number, positive, power_of_two
+from rthstrack.errors import ConfigurationError, SettingError
+from rthstrack.live.layout import default_layout, read_layout
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+    from rthstrack.live.layout import Layout, Source
+
+_WINDOWS = ("boxcar", "hann", "hamming", "blackman", "flattop", "tukey")
+_DETRENDS = ("none", "mean", "linear")
+_PAGE_PORT = 8765
+_HIGHEST_HZ = 32.0
+# Of one evaluated sample of one actuator: history, transforms and what the estimators keep of them.
+_STATE_BYTES = 256
+_MOST_STATE_BYTES = 1 << 30
+
+
+def add_options(parser: argparse.ArgumentParser, wrong: dict[str, str]) -> None:
+    """Adds all options. Values that do not fit go to `wrong`, by option, for all mistakes are told at once."""
+    _add_input(parser.add_argument_group("input"), wrong)
+    _add_evaluation(parser.add_argument_group("evaluation"), wrong)
+    _add_alarms(parser.add_argument_group("alarms (advisory)"), wrong)
+    _add_output(parser.add_argument_group("output"), wrong)
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Plan:
+    """What `_core.Live` is made of, and what is around it."""
+
+    layout: Layout
+    monitor: dict[str, Any]
+    source: dict[str, Any]
+    alarms: dict[str, Any]
+    outputs: dict[str, Any]
+
+    def settings(self) -> dict[str, Any]:
+        """What a log says of how it was made."""
+        return {"monitor": self.monitor, "source": self.source, "alarms": self.alarms, "names": list(self.layout.names)}
+
+
+# Options --------------------------------------------------------------------------------------------------------------
+
+
+def _gathered(wrong: dict[str, str], option: str, read: Callable[[str], Any]) -> Callable[[str], Any]:
+    """Reads an option's value; what is wrong with it is noted and the value None."""
+
+    def convert(text: str) -> Any:
+        try:
+            return read(text)
+        except argparse.ArgumentTypeError as error:
+            wrong.setdefault(option, str(error))
+            return None
+
+    return convert
+
+
+def _one_of(*choices: str) -> Callable[[str], str]:
+    def read(text: str) -> str:
+        if text not in choices:
+            raise argparse.ArgumentTypeError(f"expected one of {', '.join(choices)}, found '{text}'")
+        return text
+
+    return read
+
+
+def _adder(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> Callable[..., None]:
+    def add(option: str, read: Callable[[str], Any], metavar: Any, told: str, **more: Any) -> None:
+        group.add_argument(option, type=_gathered(wrong, option, read), metavar=metavar, help=told, **more)
+
+    return add
+
+
+def _add_input(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> None:
+    add = _adder(group, wrong)
+    add("--listen", _listen, "udp://HOST:PORT|-", "datagrams at this address (port 0: a free one), or - for lines on "
+        "standard input")  # fmt: skip
+    group.add_argument("--layout", metavar="FILE.toml", help="where counter, target and measured stand in a sample")
+    add("--actuators", count, "N", "without --layout: how many actuators a sample has (1)")
+    add("--rate", positive, "HZ", "samples a second, of each actuator")
+    add("--fill", _whole, "SAMPLES", "longest gap that is filled by a straight line; longer ones restart the window "
+        "(5)")  # fmt: skip
+    add("--allow", addresses.senders, "SENDER", "take datagrams of this machine only; may be repeated", action="append")
+    group.add_argument("--any-pace", action="store_true", help="do not compare the pace of the counter with --rate")
+
+
+def _add_evaluation(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> None:
+    add = _adder(group, wrong)
+    add("--window", positive, "S", "length of the window (4 s)")
+    add("--update", positive, "HZ", "readings a second, of each actuator (16)")
+    add("--band", not_negative, ("LO", "HI"), f"frequencies judged (0 to {_HIGHEST_HZ:g} Hz, or a quarter of the rate "
+        "if that is lower)", nargs=2)  # fmt: skip
+    add("--estimator", _one_of(*ESTIMATORS), "E", "least_squares (default), aligned or fei")
+    add("-P", power_of_two, "N", "data decimation, a power of two (the largest for which HI is at most rate / 4P)")
+    add("-Q", power_of_two, "N", "frequency decimation, a power of two (1)")
+    add("--window-shape", _one_of(*_WINDOWS), "W", f"one of {', '.join(_WINDOWS)} (boxcar)")
+    add("--detrend", _one_of(*_DETRENDS), "D", "none, mean (default) or linear")
+    add("--max-delay", positive, "S", "largest delay or lead looked for by all estimators but fei (0.25)")
+    add("--expected-delay", number, "S", "where the search begins, instead of at what the window shows")
+    add("--minimum-amplitude", not_negative, "X", "windows whose target moves less are not judged (0)")
+
+
+def _add_alarms(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> None:
+    add = _adder(group, wrong)
+    add("--limit-delay", positive, "S", "largest |delay|")
+    add("--limit-amplitude", positive, "X", "largest |amplitude - 1|")
+    add("--critical-delay", positive, "S", "delay at which the test becomes unstable ('rthstrack simulate' tells it)")
+    add("--critical-fraction", positive, "X", "share of --critical-delay that the delay may reach (0.5)")
+    add("--limit-lost", count, "N", "most samples lost within a window")
+    add("--silence", positive, "S", "longest time without a sample (1)")
+    add("--hysteresis", _share, "X", "an alarm is over when this share of its limit below it (0.1)")
+    add("--alarm-after", not_negative, "S", "raise it only when the limit was exceeded for so long (0)")
+    group.add_argument(
+        "--no-latch", action="store_true", help="an alarm that is over is gone; else it waits for a reset"
+    )
+    add("--alarm-to", addresses.udp, "udp://HOST:PORT", "send a datagram (JSON) when an alarm is raised or over")
+    add("--control", addresses.port, "PORT", "take datagrams 'reset' from this machine at this port (a free one)",
+        nargs="?", const=0)  # fmt: skip
+    group.add_argument("--exit-on-alarm", action="store_true", help="end at the first alarm, with exit status 3")
+
+
+def _add_output(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> None:
+    add = _adder(group, wrong)
+    add("--readings", _readings, "FILE.jsonl|udp://HOST:PORT", "readings as lines of JSON, or a datagram each; may be "
+        "given twice", action="append")  # fmt: skip
+    group.add_argument("--log", type=Path, metavar="FILE.arrows", help="samples, and readings in FILE.readings.arrows, "
+                       "as Arrow streams that 'rthstrack evaluate' and pandas read")  # fmt: skip
+    add("--page", addresses.port, "PORT", f"a live page for browsers ({_PAGE_PORT}; 0: a free port)", nargs="?",
+        const=_PAGE_PORT)  # fmt: skip
+    add("--page-host", addresses.host, "HOST", "address that the page is served at (127.0.0.1: this machine only)")
+    add("--duration", positive, "S", "end after so long")
+    how = group.add_mutually_exclusive_group()
+    how.add_argument(
+        "--quiet", action="store_true", help="no table, and nothing but alarms and errors on standard error"
+    )
+    how.add_argument(
+        "--view", action="store_true", help="the table, on standard error if standard output is no terminal"
+    )
+
+
+def _listen(text: str) -> str:
+    return text if text == "-" else addresses.udp_or_any_port(text)
+
+
+def _readings(text: str) -> str | Path:
+    return addresses.udp(text) if text.lower().startswith("udp:") else Path(text)
+
+
+def _whole(text: str) -> int:
+    if not text.isascii() or not text.isdigit() or len(text) > 15:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 0 on, found '{text}'")
+    return int(text)
+
+
+def _share(text: str) -> float:
+    if not 0 <= (value := number(text)) < 1:
+        raise argparse.ArgumentTypeError(f"expected a number from 0 to less than 1, found '{text}'")
+    return value
+
+
+# Checks ---------------------------------------------------------------------------------------------------------------
+
+
+def checked_plan(args: argparse.Namespace, wrong: Mapping[str, str]) -> Plan:
+    """Raises SettingError with all mistakes, a line each."""
+    mistakes = [f"{option}: {message}" for option, message in wrong.items()]
+    if args.listen is None and "--listen" not in wrong:
+        mistakes.append("--listen is missing: give --listen udp://HOST:PORT for datagrams, or --listen - for lines on "
+                        "standard input")  # fmt: skip
+    if args.rate is None and "--rate" not in wrong:
+        mistakes.append("--rate is missing: give the samples a second, --rate HZ")
+    layout = _layout(args, mistakes)
+    monitor = _monitor(args, layout.n_actuators, mistakes)
+    mistakes += _contradictions(args)
+    readings = _outputs(args, mistakes)
+    if mistakes:
+        raise SettingError("\n".join(mistakes))
+    is_udp = args.listen != "-"
+    source = {
+        "kind": "udp" if is_udp else "lines",
+        "address": args.listen if is_udp else None,
+        "senders": [one for named in args.allow for one in named] if args.allow else None,
+        "layout": layout.to_dict(),
+        "fill_samples": 5 if args.fill is None else args.fill,
+        # A file that is read as lines comes as fast as it can.
+        "check_pace": is_udp and not args.any_pace,
+        "path": None,
+    }
+    alarms = {
+        "limit_delay_s": args.limit_delay,
+        "limit_amplitude": args.limit_amplitude,
+        "critical_delay_s": args.critical_delay,
+        "critical_fraction": args.critical_fraction or 0.5,
+        "limit_lost": args.limit_lost,
+        "silence_s": args.silence or 1.0,
+        "hysteresis": 0.1 if args.hysteresis is None else args.hysteresis,
+        "minimum_duration_s": args.alarm_after or 0.0,
+        "latch": not args.no_latch,
+    }
+    outputs = {
+        **readings,
+        "alarm_udp": args.alarm_to,
+        "control": None if args.control is None else f"127.0.0.1:{args.control}",
+        "log": args.log is not None,
+        "page": args.page is not None,
+    }
+    return Plan(layout, monitor, source, alarms, outputs)
+
+
+def _layout(args: argparse.Namespace, mistakes: list[str]) -> Layout:
+    """The layout; where it is wrong, that of one actuator, so that the rest can be checked."""
+    source: Source = "lines" if args.listen == "-" else "udp"
+    if args.layout is not None and args.actuators is not None:
+        mistakes.append("--actuators speaks of the default layout, and --layout names another: give one of them")
+    try:
+        if args.layout is not None:
+            return read_layout(args.layout, source)
+        return default_layout(source, args.actuators or 1)
+    except ConfigurationError as error:
+        mistakes += [f"--actuators: {line}" if args.layout is None else line for line in str(error).splitlines()]
+        return default_layout(source)
+
+
+def _monitor(args: argparse.Namespace, n_actuators: int, mistakes: list[str]) -> dict[str, Any]:
+    """The fields of the core's MonitorConfig."""
+    rate, window, update = args.rate or 1024.0, args.window or 4.0, args.update or min(16.0, args.rate or 1024.0)
+    band = (0.0, min(_HIGHEST_HZ, rate / 4)) if args.band is None or None in args.band else tuple(args.band)
+    p = args.P or _decimation(rate, band[1], update)
+    if args.rate is not None:
+        mistakes += _band_mistakes(rate, band, args.P)
+        if update > rate / p:
+            mistakes.append(f"--update: expected at most the {rate / p:g} samples a second that are evaluated, "
+                            f"found {update:g}")  # fmt: skip
+        if window * rate < 8:
+            mistakes.append(f"--window: expected at least 8 samples, found {window:g} s, {window * rate:.3g} samples")
+        if args.fill is not None and args.fill > window * rate:
+            mistakes.append(
+                f"--fill: expected at most the {window * rate:.0f} samples of the window, found {args.fill}"
+            )
+        size = n_actuators * window * rate / p * _STATE_BYTES
+        if size > (most := _most_bytes()):
+            mistakes.append(
+                f"--window: {window:g} s of {n_actuators} actuator(s) at {rate / p:g} evaluated samples a second need "
+                f"about {size / 2**20:.0f} MiB, expected at most {most / 2**20:.0f} MiB; take a shorter one"
+            )
+    max_delay = args.max_delay or 0.25
+    if args.expected_delay is not None and abs(args.expected_delay) > max_delay:
+        mistakes.append(
+            f"--expected-delay: expected at most --max-delay, {max_delay:g} s, found {args.expected_delay:g}"
+        )
+    return {
+        "rate_hz": rate,
+        "window_s": window,
+        "update_hz": update,
+        "band_hz": band,
+        "window": args.window_shape or "boxcar",
+        "detrend": args.detrend or "mean",
+        "estimator": args.estimator or "least_squares",
+        "data_decimation": p,
+        "frequency_decimation": args.Q or 1,
+        "max_delay_s": max_delay,
+        "expected_delay_s": args.expected_delay,
+        "minimum_amplitude": args.minimum_amplitude or 0.0,
+        "n_actuators": n_actuators,
+    }
+
+
+def _decimation(rate: float, highest: float, update: float) -> int:
+    """The largest power of two P with highest <= rate / 4P that leaves a sample for every reading."""
+    p = 1
+    while 2 * p < rate and highest <= rate / (8 * p) and update <= rate / (2 * p):
+        p *= 2
+    return p
+
+
+def _band_mistakes(rate: float, band: tuple[float, ...], p: int | None) -> Iterator[str]:
+    low, high = band
+    if low >= high:
+        yield f"--band: expected LO below HI, found {low:g} and {high:g}"
+    elif high > rate / 2 / (p or 1):
+        decimated = f", {rate / p:g} Hz after -P {p}" if p and p > 1 else ""
+        yield f"--band: expected HI of at most half the rate{decimated}, {rate / 2 / (p or 1):g} Hz, found {high:g}"
+
+
+def _most_bytes() -> float:
+    """What the windows may take: half of the memory that is free, and no more than 1 GiB."""
+    try:
+        free = os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return _MOST_STATE_BYTES
+    return min(_MOST_STATE_BYTES, free / 2)
+
+
+def _contradictions(args: argparse.Namespace) -> Iterator[str]:
+    """Options that speak of another one that is not there."""
+    if args.critical_fraction is not None and args.critical_delay is None:
+        yield "--critical-fraction speaks of --critical-delay: give it too"
+    if args.page_host is not None and args.page is None:
+        yield "--page-host speaks of --page: give it too"
+    if args.listen == "-":
+        for option in ("allow", "any_pace"):
+            if getattr(args, option):
+                yield f"--{option.replace('_', '-')} speaks of datagrams, and --listen - takes lines"
+    if args.view and not (sys.stdout.isatty() or sys.stderr.isatty()):
+        yield "--view: neither standard output nor standard error is a terminal"
+
+
+def _outputs(args: argparse.Namespace, mistakes: list[str]) -> dict[str, Any]:
+    """Where readings go; files that are to be written are looked at before anything starts."""
+    found: dict[str, Any] = {"readings_udp": None, "readings_file": None}
+    files = {}
+    for one in args.readings or []:
+        name = "readings_udp" if isinstance(one, str) else "readings_file"
+        if one is None:
+            continue
+        if found[name] is not None:
+            mistakes.append("--readings: expected at most one file and one address, found two of a kind")
+        found[name] = str(one)
+        if isinstance(one, Path):
+            files["--readings"] = one
+    if args.log is not None:
+        from rthstrack.live.log import readings_path
+
+        files["--log"] = args.log
+        if args.log.name:
+            files["--log, its readings"] = readings_path(args.log)
+    for option, path in files.items():
+        # Lines are written behind what a file holds; a log begins with its schema.
+        problems = _not_writable(path, may_hold_something=option == "--readings")
+        mistakes += [f"{option}: {path}: {message}" for message in problems]
+    logs = [option for option, path in files.items() if path == files.get("--readings") and option != "--readings"]
+    mistakes += [f"--readings and {option} name the same file, {files[option]}" for option in logs]
+    return found
+
+
+def _not_writable(path: Path, *, may_hold_something: bool) -> Iterator[str]:
+    try:
+        if path.is_dir():
+            yield "is a directory; expected the name of a file"
+        elif path.is_file() and path.stat().st_size and not may_hold_something:
+            yield "is there already and holds something: nothing is overwritten; choose another name"
+        elif not path.parent.is_dir():
+            yield f"there is no directory {path.parent}"
+        elif not os.access(path if path.exists() else path.parent, os.W_OK):
+            yield "this user may not write there"
+    except OSError as error:
+        yield error.strerror or str(error)
