@@ -7,7 +7,7 @@
 //! Data flows through the modules in this order:
 //!
 //! 1. [`settings`]: the user's settings, every key checked.
-//! 2. [`layout`] and [`line`]: bytes to samples. Pure.
+//! 2. [`layout`] and [`mod@line`]: bytes to samples. Pure.
 //! 3. [`sequence`]: what was lost, repeated, reordered, by the sender's counter. Pure.
 //! 4. [`engine`]: fills short gaps, starts windows anew, steps the monitor. Pure; so are [`alarm`] and `pace`, which it uses.
 //! 5. `receive`, `lines`: the receiving thread. It waits for its input and for nothing else.
