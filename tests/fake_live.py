@@ -26,7 +26,7 @@ ALARMS = {
     "limit_delay_s", "limit_amplitude", "critical_delay_s", "critical_fraction", "limit_lost", "silence_s",
     "hysteresis", "minimum_duration_s", "latch",
 }  # fmt: skip
-OUTPUTS = {"readings_udp", "readings_file", "alarm_udp", "control", "log", "page"}
+OUTPUTS = {"readings_udp", "readings_file", "alarm_udp", "control", "log", "page", "names"}
 
 
 class FakeLive:

@@ -95,7 +95,7 @@ def test_all_mistakes_are_told_at_once_a_line_each_and_nothing_is_started(
         ([*UDP, "--fill", "5000"], "--fill: expected at most the 4096 samples of the window, found 5000"),
         ([*UDP, "--allow", "no such host"], "--allow: expected an address"),
         ([*UDP, "--update", "2000"], "--update: expected at most the 1024 samples a second"),
-        ([*UDP, "-P", "64"], "--band: expected HI of at most half the rate, 16 Hz after -P 64, 8 Hz, found 32"),
+        ([*UDP, "-P", "64"], "--band: expected HI of at most rate / (4 P), P = 64, 4 Hz, found 32"),
         ([*UDP, "--band", "8", "2"], "--band: expected LO below HI, found 8 and 2"),
         ([*UDP, "--band", "0", "513"], "--band: expected HI of at most half the rate, 512 Hz, found 513"),
         ([*UDP, "--window", "0.001"], "--window: expected at least 8 samples"),
@@ -175,6 +175,7 @@ def test_defaults_are_those_that_the_help_states(capsys: pytest.CaptureFixture[s
     }  # fmt: skip
     assert made.outputs == {
         "readings_udp": None, "readings_file": None, "alarm_udp": None, "control": None, "log": False, "page": False,
+        "names": ["actuator 0", "actuator 1"],
     }  # fmt: skip
 
 
@@ -208,7 +209,7 @@ def test_every_option_reaches_the_compiled_part(
     }  # fmt: skip
     assert made.outputs == {
         "readings_udp": "127.0.0.1:7003", "readings_file": str(tmp_path / "r.jsonl"), "alarm_udp": "127.0.0.1:7001",
-        "control": "127.0.0.1:7002", "log": True, "page": False,
+        "control": "127.0.0.1:7002", "log": True, "page": False, "names": ["actuator 0"],
     }  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""The README's Python and commands, and those of two pages of docs, run as pasted: in order, in an empty folder a page."""
+"""The README's Python and commands, and those of pages of docs, run as pasted: in order, in an empty folder a page."""
 
 from __future__ import annotations
 

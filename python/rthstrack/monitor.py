@@ -70,14 +70,16 @@ class Readings(_Result):
         return columns | {"valid": self.valid, "reason": list(self.reason)}
 
 
-def largest_decimation(rate_hz: float, high_hz: float) -> int:
+def largest_decimation(rate_hz: float, high_hz: float, update_hz: float = 0.0) -> int:
     """The largest P, a power of two, at which the causal decimator passes up to `high_hz`: rate / (4 P) >= high.
+
+    It leaves a sample for every reading: rate / P >= update.
 
     >>> largest_decimation(1024, 32)
     8
     """
     factor = 1
-    while rate_hz / (8 * factor) >= high_hz * (1 - 1e-9) and factor < 2**20:
+    while high_hz * (1 - 1e-9) <= rate_hz / (8 * factor) and update_hz <= rate_hz / (2 * factor) and factor < 2**17:
         factor *= 2
     return factor
 
@@ -130,7 +132,9 @@ class Monitor:
     ) -> None:
         rate_hz, band = _number("rate_hz", rate_hz), _band(band_hz)
         if data_decimation is None:
-            data_decimation = largest_decimation(rate_hz, band[1]) if band and band[1] > 0 else 1
+            data_decimation = (
+                largest_decimation(rate_hz, band[1], _number("update_hz", update_hz)) if band and band[1] > 0 else 1
+            )
         self.settings = MonitorSettings(
             rate_hz,
             _number("window_s", window_s),

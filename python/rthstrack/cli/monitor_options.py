@@ -13,6 +13,7 @@ from rthstrack.cli import addresses
 from rthstrack.cli.arguments import ESTIMATORS, count, not_negative, number, positive, power_of_two
 from rthstrack.errors import ConfigurationError, SettingError
 from rthstrack.live.layout import default_layout, read_layout
+from rthstrack.monitor import largest_decimation
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -108,7 +109,12 @@ def _add_evaluation(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> No
     add("--window-shape", _one_of(*_WINDOWS), "W", f"one of {', '.join(_WINDOWS)} (boxcar)")
     add("--detrend", _one_of(*_DETRENDS), "D", "none, mean (default) or linear")
     add("--max-delay", positive, "S", "largest delay or lead looked for by all estimators but fei (0.25)")
-    add("--expected-delay", number, "S", "where the search begins, instead of at what the window shows")
+    add(
+        "--expected-delay",
+        number,
+        "S",
+        "of delays that fit equally well, the target being one tone, take the one nearest to this; 0: nearest to none",
+    )
     add("--minimum-amplitude", not_negative, "X", "windows whose target moves less are not judged (0)")
 
 
@@ -215,6 +221,7 @@ def checked_plan(args: argparse.Namespace, wrong: Mapping[str, str]) -> Plan:
         "control": None if args.control is None else f"127.0.0.1:{args.control}",
         "log": args.log is not None,
         "page": args.page is not None,
+        "names": list(layout.names),
     }
     return Plan(layout, monitor, source, alarms, outputs)
 
@@ -237,7 +244,7 @@ def _monitor(args: argparse.Namespace, n_actuators: int, mistakes: list[str]) ->
     """The fields of the core's MonitorConfig."""
     rate, window, update = args.rate or 1024.0, args.window or 4.0, args.update or min(16.0, args.rate or 1024.0)
     band = (0.0, min(_HIGHEST_HZ, rate / 4)) if args.band is None or None in args.band else tuple(args.band)
-    p = args.P or _decimation(rate, band[1], update)
+    p = args.P or largest_decimation(rate, band[1], update)
     if args.rate is not None:
         mistakes += _band_mistakes(rate, band, args.P)
         if update > rate / p:
@@ -277,21 +284,15 @@ def _monitor(args: argparse.Namespace, n_actuators: int, mistakes: list[str]) ->
     }
 
 
-def _decimation(rate: float, highest: float, update: float) -> int:
-    """The largest power of two P with highest <= rate / 4P that leaves a sample for every reading."""
-    p = 1
-    while 2 * p < rate and highest <= rate / (8 * p) and update <= rate / (2 * p):
-        p *= 2
-    return p
-
-
 def _band_mistakes(rate: float, band: tuple[float, ...], p: int | None) -> Iterator[str]:
     low, high = band
+    highest, of_rate = (
+        (rate / 2, "half the rate") if p is None or p == 1 else (rate / (4 * p), f"rate / (4 P), P = {p}")
+    )
     if low >= high:
         yield f"--band: expected LO below HI, found {low:g} and {high:g}"
-    elif high > rate / 2 / (p or 1):
-        decimated = f", {rate / p:g} Hz after -P {p}" if p and p > 1 else ""
-        yield f"--band: expected HI of at most half the rate{decimated}, {rate / 2 / (p or 1):g} Hz, found {high:g}"
+    elif high > highest * (1 + 1e-9):
+        yield f"--band: expected HI of at most {of_rate}, {highest:g} Hz, found {high:g}"
 
 
 def _most_bytes() -> float:
