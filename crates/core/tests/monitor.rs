@@ -282,6 +282,8 @@ fn one_tone_is_ambiguous_until_the_delay_to_expect_is_told() {
     assert!(matches!(last(config).tracking.reason, Some(Reason::Ambiguous { .. })));
     let told = last(MonitorConfig { expected_delay_s: Some(0.0), ..config });
     assert!((told.tracking.delay_s - 0.020).abs() < 1e-9, "{told:?}");
+    let a_period_later = last(MonitorConfig { expected_delay_s: Some(0.18), ..config });
+    assert!((a_period_later.tracking.delay_s - 0.020 - 1.0 / 6.0).abs() < 1e-9, "{a_period_later:?}");
 }
 
 #[test]
@@ -295,6 +297,7 @@ fn after_a_restart_nothing_is_left_of_what_came_before() {
             monitor.step(&mut state, &[f64::NAN], &[i as f64]);
         }
         monitor.restart(&mut state, 10_000);
+        assert_eq!(monitor.window(&state, 0), (&[][..], &[][..]));
         let again: Vec<Reading> = target
             .iter()
             .zip(&measured)
