@@ -12,7 +12,7 @@
 use crate::causal::{CausalDecimator, CausalState, Ring};
 use crate::decimate::Decimator;
 use crate::error::{Error, Result};
-use crate::pair::{MIN_SAMPLES, Pair, check_rate};
+use crate::pair::{MIN_SAMPLES, Pair, check_rate, is_fourth_power};
 use crate::reason::Reason;
 use crate::sums;
 use crate::tracking::{Estimator, Evaluator, EvaluatorConfig, EvaluatorState, Tracking};
@@ -357,6 +357,10 @@ impl Monitor {
         let n = actuator.target.len();
         let (target, measured) = (actuator.target.last(n), actuator.measured.last(n));
         let own = &target[n - self.window..];
+        // What came before the window is a help, and no reason to refuse it: only what follows the last bad sample is shown.
+        let bad = |signal: &[f64]| signal[..n - self.window].iter().rposition(|x| !is_fourth_power(*x));
+        let from = bad(target).max(bad(measured)).map_or(0, |last| last + 1);
+        let (target, measured) = (&target[from..], &measured[from..]);
         if self.config.minimum_amplitude > 0.0 && amplitude(own) < self.config.minimum_amplitude {
             return Tracking::undetermined(Reason::Still);
         }

@@ -77,7 +77,7 @@ impl<'a> Pair<'a> {
 
     /// The same for products of four samples.
     pub(crate) fn check_fourth_powers(&self) -> Result<()> {
-        self.check_powers(4, 1e-60..=1e60)
+        self.check_powers(4, 1e-60..=LARGEST_FOURTH_POWER)
     }
 
     fn check_powers(&self, weight_power: u32, magnitudes: std::ops::RangeInclusive<f64>) -> Result<()> {
@@ -96,6 +96,14 @@ impl<'a> Pair<'a> {
 
 /// Magnitudes whose squares, and sums and ratios of these, keep their precision.
 const SQUARABLE: std::ops::RangeInclusive<f64> = 1e-120..=1e120;
+
+/// Largest magnitude of which products of four keep their precision.
+const LARGEST_FOURTH_POWER: f64 = 1e60;
+
+/// Whether a sample is finite, and not too large for [`Pair::check_fourth_powers`].
+pub(crate) fn is_fourth_power(sample: f64) -> bool {
+    sample.abs() <= LARGEST_FOURTH_POWER
+}
 
 /// max |x|
 pub(crate) fn peak(samples: &[f64]) -> f64 {
