@@ -299,7 +299,8 @@ rthstrack_status rthstrack_monitor_config_default(struct rthstrack_monitor_confi
 // Makes a monitor and writes it to `*monitor`; null there when it fails. One line that says what is wrong is written
 // to `message`, which has room for `capacity` bytes, the final zero included; 256 are plenty. `message` may be null.
 //
-// Any thread. Uses the heap: not real-time safe. The monitor lives until rthstrack_monitor_destroy.
+// Any thread. Uses the heap: not real-time safe; where memory runs out the process ends, as Rust's programs do. The
+// monitor lives until rthstrack_monitor_destroy.
 //
 // RTHSTRACK_BAD_POINTER, RTHSTRACK_ABI_MISMATCH, RTHSTRACK_BAD_SETTING, RTHSTRACK_PANIC.
 rthstrack_status rthstrack_monitor_create(const struct rthstrack_monitor_config *config,
@@ -317,7 +318,8 @@ void rthstrack_monitor_destroy(struct rthstrack_monitor *monitor);
 // n_actuators at any time; `*n_readings` is how many were written, 0 or n_actuators. Samples may be any number: one
 // that is NaN or infinite makes the readings invalid whose window holds it.
 //
-// One thread at a time. Real-time safe: no heap, no lock, no system call; the steps with a reading take the longest.
+// One thread at a time. Real-time safe: no heap, no lock, no system call (but for RTHSTRACK_PANIC, which means a
+// mistake in the library and is told on standard error); the steps with a reading take the longest.
 //
 // RTHSTRACK_BAD_POINTER, RTHSTRACK_NO_ROOM (the sample was not taken), RTHSTRACK_PANIC.
 rthstrack_status rthstrack_monitor_step(struct rthstrack_monitor *monitor,

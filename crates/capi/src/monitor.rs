@@ -43,26 +43,11 @@ impl Room {
     }
 }
 
-/// Takes samples as far as there is room for their readings; how many it took.
-fn take(plan: &Monitor, state: &mut MonitorState, target: &[f64], measured: &[f64], room: &mut Room) -> usize {
-    let n = plan.config().n_actuators;
-    let mut taken = 0;
-    for (target, measured) in target.chunks_exact(n).zip(measured.chunks_exact(n)) {
-        if room.left() < n && plan.samples_until_reading(state) == 1 {
-            break;
-        }
-        if let Some(readings) = plan.step(state, target, measured) {
-            room.write(readings);
-        }
-        taken += 1;
-    }
-    taken
-}
-
 /// Makes a monitor and writes it to `*monitor`; null there when it fails. One line that says what is wrong is written
 /// to `message`, which has room for `capacity` bytes, the final zero included; 256 are plenty. `message` may be null.
 ///
-/// Any thread. Uses the heap: not real-time safe. The monitor lives until rthstrack_monitor_destroy.
+/// Any thread. Uses the heap: not real-time safe; where memory runs out the process ends, as Rust's programs do. The
+/// monitor lives until rthstrack_monitor_destroy.
 ///
 /// RTHSTRACK_BAD_POINTER, RTHSTRACK_ABI_MISMATCH, RTHSTRACK_BAD_SETTING, RTHSTRACK_PANIC.
 #[unsafe(no_mangle)]
@@ -129,7 +114,8 @@ pub unsafe extern "C" fn rthstrack_monitor_destroy(monitor: *mut rthstrack_monit
 /// n_actuators at any time; `*n_readings` is how many were written, 0 or n_actuators. Samples may be any number: one
 /// that is NaN or infinite makes the readings invalid whose window holds it.
 ///
-/// One thread at a time. Real-time safe: no heap, no lock, no system call; the steps with a reading take the longest.
+/// One thread at a time. Real-time safe: no heap, no lock, no system call (but for RTHSTRACK_PANIC, which means a
+/// mistake in the library and is told on standard error); the steps with a reading take the longest.
 ///
 /// RTHSTRACK_BAD_POINTER, RTHSTRACK_NO_ROOM (the sample was not taken), RTHSTRACK_PANIC.
 #[unsafe(no_mangle)]
@@ -141,10 +127,12 @@ pub unsafe extern "C" fn rthstrack_monitor_step(
     capacity: usize,
     n_readings: *mut usize,
 ) -> rthstrack_status {
-    if !(is_sound_out(monitor) && is_sound(target) && is_sound(measured)) {
+    if !is_sound_out(n_readings) {
         return RTHSTRACK_BAD_POINTER;
     }
-    if !(is_sound_out(readings) && is_sound_out(n_readings)) {
+    // SAFETY: not null and aligned.
+    unsafe { n_readings.write(0) };
+    if !(is_sound_out(monitor) && is_sound(target) && is_sound(measured) && is_sound_out(readings)) {
         return RTHSTRACK_BAD_POINTER;
     }
     // SAFETY: the caller has it from `create` and lets no other thread use it now.
@@ -157,7 +145,9 @@ pub unsafe extern "C" fn rthstrack_monitor_step(
         }
         // SAFETY: not null, aligned, and of n_actuators values.
         let (target, measured) = unsafe { (slice::from_raw_parts(target, n), slice::from_raw_parts(measured, n)) };
-        take(plan, state, target, measured, &mut room);
+        if let Some(readings) = plan.step(state, target, measured) {
+            room.write(readings);
+        }
         RTHSTRACK_OK
     });
     // SAFETY: not null and aligned.
@@ -208,7 +198,8 @@ pub unsafe extern "C" fn rthstrack_monitor_process(
         if n_samples > 0 {
             // SAFETY: not null, aligned, and of n_samples * n_actuators values, a size that memory can hold.
             let signal = |first: *const f64| unsafe { slice::from_raw_parts(first, values) };
-            taken = take(plan, state, signal(target), signal(measured), &mut room);
+            let (target, measured) = (signal(target), signal(measured));
+            taken = plan.process_with(state, target, measured, capacity, |readings| room.write(readings)).samples;
         }
         if taken < n_samples { RTHSTRACK_NO_ROOM } else { RTHSTRACK_OK }
     });

