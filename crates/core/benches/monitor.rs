@@ -154,8 +154,8 @@ fn main() {
     }
     let cases: Vec<String> = cases.iter().map(measure).collect();
     println!(
-        "{{\"empty_loop_ns\": {{\"least_of_five\": {of_five:?}, \"one_run\": {:?}}},\n \"cases\": [\n  {}\n ]}}",
+        "{{\"empty_loop_ns\": {{\"least_of_five\": {of_five:?}, \"one_run\": {:?}}}, \"cases\": [{}]}}",
         percentiles(alone),
-        cases.join(",\n  ")
+        cases.join(", ")
     );
 }

@@ -1,7 +1,8 @@
 //! Advisory alarms: limits on readings, on lost samples and on silence. No clock of its own.
 //!
 //! An alarm is raised when its value has been over the limit for the minimum duration, and is over when the value has fallen
-//! below the limit by the hysteresis. A latched alarm is then held until it is reset. Readings without numbers change nothing.
+//! below the limit by the hysteresis. A latched alarm is then held until it is reset. Readings without numbers neither raise nor end
+//! one, but they break off what had lasted; that an actuator has not been judged for long is an alarm of its own.
 
 use rthstrack::Reading;
 
@@ -20,6 +21,8 @@ pub struct AlarmConfig {
     pub limit_lost: Option<u64>,
     /// Longest time without a sample.
     pub silence_s: Option<f64>,
+    /// Longest time in which samples came and an actuator that moves could not be judged.
+    pub unjudged_s: Option<f64>,
     /// By what share of the limit a value must fall below it.
     pub hysteresis: f64,
     /// How long a value must be over the limit. Silence has its own time.
@@ -37,6 +40,7 @@ impl Default for AlarmConfig {
             critical_fraction: 0.5,
             limit_lost: None,
             silence_s: Some(1.0),
+            unjudged_s: None,
             hysteresis: 0.1,
             minimum_duration_s: 0.0,
             latch: true,
@@ -58,6 +62,7 @@ impl AlarmConfig {
         positive("critical_delay_s", self.critical_delay_s, "duration in seconds");
         positive("critical_fraction", Some(self.critical_fraction), "share of the critical delay");
         positive("silence_s", self.silence_s, "duration in seconds");
+        positive("unjudged_s", self.unjudged_s, "duration in seconds");
         if !(0.0..1.0).contains(&self.hysteresis) {
             found.push(format!("hysteresis must be a share of the limit from 0 to below 1, not {}", self.hysteresis));
         }
@@ -82,11 +87,14 @@ pub enum Kind {
     Lost,
     /// Seconds without a sample.
     Silence,
+    /// Seconds in which an actuator that moves was not judged.
+    Unjudged,
 }
 
 impl Kind {
     /// All kinds, in the order of [`Kind::bit`].
-    pub const ALL: [Kind; 5] = [Kind::Delay, Kind::Amplitude, Kind::CriticalDelay, Kind::Lost, Kind::Silence];
+    pub const ALL: [Kind; 6] =
+        [Kind::Delay, Kind::Amplitude, Kind::CriticalDelay, Kind::Lost, Kind::Silence, Kind::Unjudged];
 
     /// Its name on the wire.
     pub fn name(self) -> &'static str {
@@ -96,6 +104,7 @@ impl Kind {
             Kind::CriticalDelay => "critical_delay",
             Kind::Lost => "lost",
             Kind::Silence => "silence",
+            Kind::Unjudged => "unjudged",
         }
     }
 
@@ -104,23 +113,46 @@ impl Kind {
         1 << self as u8
     }
 
-    fn value_of(self, reading: &Reading, config: &AlarmConfig) -> f64 {
+    /// Of a valid reading, with its sign.
+    fn value_of(self, reading: &Reading, config: &AlarmConfig) -> Option<f64> {
         match self {
-            Kind::Amplitude => (reading.tracking.amplitude - 1.0).abs(),
-            Kind::CriticalDelay => reading.tracking.delay_s / config.critical_delay_s.unwrap_or(f64::NAN),
-            _ => reading.tracking.delay_s.abs(),
+            Kind::Delay => Some(reading.tracking.delay_s),
+            Kind::Amplitude => Some(reading.tracking.amplitude - 1.0),
+            Kind::CriticalDelay => Some(reading.tracking.delay_s / config.critical_delay_s?),
+            Kind::Unjudged => Some(0.0),
+            Kind::Lost | Kind::Silence => None,
         }
     }
 
+    /// What is compared with the limit: a lead is as bad as a lag, but brings no structure nearer to its critical delay.
+    fn compared(self, value: f64) -> f64 {
+        match self {
+            Kind::Delay | Kind::Amplitude => value.abs(),
+            _ => value,
+        }
+    }
+
+    /// Of the value that goes farthest, with its sign.
     fn words(self, value: f64, limit: f64) -> String {
         match self {
-            Kind::Delay => format!("delay of {:.3} ms, limit {:.3} ms either way", 1e3 * value, 1e3 * limit),
-            Kind::Amplitude => format!("amplitude {:.3} off 1, limit {limit:.3}", value),
-            Kind::CriticalDelay => {
-                format!("delay is {:.0} % of the critical delay, limit {:.0} %", 100.0 * value, 100.0 * limit)
+            Kind::Delay => {
+                let way = if value < 0.0 { "lead" } else { "lag" };
+                format!("{way} of up to {:.3} ms, limit {:.3} ms either way", 1e3 * value.abs(), 1e3 * limit)
             }
-            Kind::Lost => format!("{value} samples missing from the last window, limit {limit}"),
-            Kind::Silence => format!("no sample for {value:.1} s, limit {limit:.1} s"),
+            Kind::Amplitude => {
+                let way = if value < 0.0 { "small" } else { "large" };
+                format!("amplitude {:.3}, too {way} by up to {:.3}, limit {limit:.3}", 1.0 + value, value.abs())
+            }
+            Kind::CriticalDelay => {
+                let (value, limit) = (100.0 * value, 100.0 * limit);
+                format!("delay is up to {value:.0} % of the critical delay, limit {limit:.0} %")
+            }
+            Kind::Lost => format!("up to {value} samples missing from the last window, limit {limit}"),
+            // Without the time, which would change all the while.
+            Kind::Silence => format!("no sample for more than {limit:.1} s"),
+            Kind::Unjudged => {
+                format!("moves, and has not been judged for more than {limit:.1} s: no other alarm sees it")
+            }
         }
     }
 }
@@ -138,13 +170,15 @@ pub struct Alarm {
     pub latched: bool,
     /// When it was raised, in seconds of the stream.
     pub since_s: f64,
-    /// The largest value since it was raised; before that, the last one.
+    /// The value that went farthest since it was raised, with its sign; before that, the last one.
     pub value: f64,
     /// What it must not exceed.
     pub limit: f64,
     /// Since when the value has been over the limit without a raised alarm.
     pending_s: Option<f64>,
     reset_while_active: bool,
+    /// Nothing is known of it now: the latest reading had no numbers.
+    blind: bool,
 }
 
 impl Alarm {
@@ -159,6 +193,7 @@ impl Alarm {
             limit,
             pending_s: None,
             reset_while_active: false,
+            blind: true,
         }
     }
 
@@ -175,16 +210,17 @@ impl Alarm {
 
     /// Compares; tells whether it was raised or ended by this.
     fn compare(&mut self, time_s: f64, value: f64, config: &AlarmConfig) -> bool {
+        self.blind = false;
         if self.active {
             return self.go_on(value, config);
         }
         // What is held shows the value that it is held for.
-        self.value = if self.latched { self.value.max(value) } else { value };
-        if value <= self.limit {
+        self.value = if self.latched { self.farther(value) } else { value };
+        if self.kind.compared(value) <= self.limit {
             self.pending_s = None;
             return false;
         }
-        let wait_s = if self.kind == Kind::Silence { 0.0 } else { config.minimum_duration_s };
+        let wait_s = if matches!(self.kind, Kind::Silence | Kind::Unjudged) { 0.0 } else { config.minimum_duration_s };
         let since_s = *self.pending_s.get_or_insert(time_s);
         // Half a nanosecond for what counting in binary fractions loses.
         if time_s - since_s < wait_s - 5e-10 {
@@ -193,17 +229,25 @@ impl Alarm {
         self.pending_s = None;
         self.active = true;
         self.reset_while_active = false;
-        if self.latched {
-            return false;
-        }
+        // One that is held and goes over its limit once more is told once more.
         self.since_s = time_s;
         true
     }
 
+    fn farther(&self, value: f64) -> f64 {
+        if self.kind.compared(value) > self.kind.compared(self.value) { value } else { self.value }
+    }
+
+    /// A reading had no numbers: how long the value has been over its limit is not known.
+    fn break_off(&mut self) {
+        self.pending_s = None;
+        self.blind = true;
+    }
+
     /// Tells whether it ended by this value.
     fn go_on(&mut self, value: f64, config: &AlarmConfig) -> bool {
-        if value > self.limit * (1.0 - config.hysteresis) {
-            self.value = self.value.max(value);
+        if self.kind.compared(value) > self.limit * (1.0 - config.hysteresis) {
+            self.value = self.farther(value);
             return false;
         }
         self.active = false;
@@ -214,12 +258,14 @@ impl Alarm {
         !self.latched
     }
 
-    /// Tells whether it ended by this. One that is over its limit goes on, and ends by itself.
+    /// Tells whether it ended by this. One that is over its limit goes on, and ends by itself; of one that is not judged any more
+    /// nobody knows.
     fn reset(&mut self) -> bool {
-        let held = self.latched && !self.active;
+        let was_raised = self.is_raised();
+        self.active &= !self.blind;
         self.latched = false;
         self.reset_while_active = self.active;
-        held
+        was_raised && !self.active
     }
 }
 
@@ -263,6 +309,7 @@ impl Alarms {
             watch(Kind::Delay, config.limit_delay_s);
             watch(Kind::Amplitude, config.limit_amplitude);
             watch(Kind::CriticalDelay, config.critical_delay_s.map(|_| config.critical_fraction));
+            watch(Kind::Unjudged, config.unjudged_s);
         }
         alarms.extend(config.limit_lost.map(|limit| Alarm::new(Kind::Lost, None, limit as f64)));
         alarms.extend(config.silence_s.map(|limit| Alarm::new(Kind::Silence, None, limit)));
@@ -283,11 +330,22 @@ impl Alarms {
     /// Compares a reading with the limits of its actuator.
     pub fn read(&mut self, reading: &Reading, tell: impl FnMut(Change)) {
         if !reading.is_valid() {
-            return;
+            return self.break_off(Some(reading.actuator));
         }
         let config = self.config;
-        let value = |kind: Kind| kind.value_of(reading, &config);
-        self.compare(Some(reading.actuator), reading.time_s, |kind| Some(value(kind)), tell);
+        self.compare(Some(reading.actuator), reading.time_s, |kind| kind.value_of(reading, &config), tell);
+    }
+
+    /// Nothing is known of an actuator now, or of any (`None`): its readings have no numbers, or there are none.
+    pub fn break_off(&mut self, actuator: Option<usize>) {
+        let concerned =
+            |a: &&mut Alarm| a.kind != Kind::Unjudged && a.actuator.is_some_and(|of| actuator.is_none_or(|a| a == of));
+        self.alarms.iter_mut().filter(concerned).for_each(Alarm::break_off);
+    }
+
+    /// Compares for how long an actuator that moves has not been judged.
+    pub fn unjudged(&mut self, actuator: usize, time_s: f64, unjudged_s: f64, tell: impl FnMut(Change)) {
+        self.compare(Some(actuator), time_s, |kind| (kind == Kind::Unjudged).then_some(unjudged_s), tell);
     }
 
     /// Compares how many samples are missing from the last window.
@@ -390,8 +448,8 @@ pub(crate) mod tests {
     #[test]
     fn a_latched_alarm_is_held_until_reset() {
         let (changes, mut alarms) =
-            delays(AlarmConfig::default(), &[(1.0, 0.02), (2.0, 0.001), (3.0, 0.02), (4.0, 0.001)]);
-        assert_eq!(changes, [(1.0, true)]);
+            delays(AlarmConfig::default(), &[(1.0, 0.02), (2.0, 0.001), (3.0, 0.018), (4.0, 0.001)]);
+        assert_eq!(changes, [(1.0, true), (3.0, true)], "once more over its limit, once more told");
         assert!(alarms.all()[0].latched && !alarms.all()[0].active);
         assert_eq!(alarms.all()[0].value, 0.02, "it shows what it is held for");
         let mut ended = Vec::new();
@@ -415,6 +473,35 @@ pub(crate) mod tests {
         let config = AlarmConfig { minimum_duration_s: 1.0, ..AlarmConfig::default() };
         let series = [(1.0, 0.02), (1.5, 0.02), (1.6, 0.001), (2.0, 0.02), (2.5, 0.02), (3.0, 0.02)];
         assert_eq!(delays(config, &series).0, [(3.0, true)]);
+    }
+
+    #[test]
+    fn what_was_not_judged_is_not_counted_as_over_the_limit() {
+        let config = AlarmConfig { minimum_duration_s: 1.0, ..AlarmConfig::default() };
+        let series = [(1.0, 0.02), (1.5, 0.02), (1.6, f64::NAN), (20.0, 0.02), (20.5, 0.02), (21.0, 0.02)];
+        assert_eq!(delays(config, &series).0, [(21.0, true)]);
+    }
+
+    #[test]
+    fn a_reset_ends_an_alarm_of_which_nothing_is_known_any_more() {
+        let (_, mut alarms) = delays(AlarmConfig::default(), &[(1.0, 0.02), (2.0, f64::NAN)]);
+        assert!(alarms.all()[0].active);
+        let mut ended = Vec::new();
+        alarms.reset(3.0, |c| ended.push((c.alarm.kind, c.raised)));
+        assert_eq!(ended, [(Kind::Delay, false)]);
+        assert!(!alarms.all()[0].is_raised());
+    }
+
+    #[test]
+    fn a_lead_is_told_as_one_and_compared_by_its_size() {
+        let (_, alarms) = delays(AlarmConfig::default(), &[(1.0, -0.02), (2.0, -0.03), (3.0, -0.025)]);
+        let text = alarms.all()[0].text();
+        assert!(text.contains("lead of up to 30.000 ms"), "{text}");
+        let config = AlarmConfig { limit_amplitude: Some(0.1), ..AlarmConfig::default() };
+        let mut alarms = Alarms::new(config, 1);
+        alarms.read(&reading(0, 1.0, 0.7, 0.0), |c| {
+            assert!(c.alarm.text().contains("too small by up to 0.300"), "{:?}", c)
+        });
     }
 
     #[test]

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use rthstrack::{Monitor, MonitorState, Reading};
+use rthstrack::{Monitor, MonitorState, Reading, Reason};
 
 use crate::alarm::{Alarm, AlarmConfig, Alarms, Change};
-use crate::pace::Pace;
+use crate::pace::{Pace, Verdict};
 use crate::sequence::{Place, Sequence, Tally};
 
-/// After so long without a sample a counter that is behind has started anew, and the pace is measured anew.
+/// After so long without a sample a counter that is behind has started anew.
 const PAUSE_S: f64 = 0.2;
 /// A pace that contradicts the rate ends the run within this time of the stream's first sample; later it is an event.
 const PACE_TRIAL_S: f64 = 10.0;
@@ -16,6 +16,8 @@ const PACE_TRIAL_S: f64 = 10.0;
 const EVENTS_A_SECOND: u32 = 10;
 /// Gaps remembered by the last window.
 const MAX_GAPS: usize = 1024;
+/// A jump ahead by more than so many times what the time that has passed, and a second, allows is no loss.
+const PLAUSIBLE: f64 = 10.0;
 
 /// A sample as the monitor took it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,6 +45,8 @@ pub struct Totals {
     pub refused: u64,
     /// Readings, of all actuators.
     pub readings: u64,
+    /// Of these, with numbers.
+    pub valid: u64,
     /// Alarms raised.
     pub alarms: u64,
 }
@@ -106,6 +110,8 @@ pub struct Engine {
     pace_told: bool,
     fatal: Option<String>,
     speech: Speech,
+    /// Of each actuator: whether its latest reading was judged, and when it last was, or did not move.
+    judged: Vec<(bool, f64)>,
 }
 
 impl Engine {
@@ -135,6 +141,7 @@ impl Engine {
             pace_told: false,
             fatal: None,
             speech: Speech::default(),
+            judged: vec![(true, 0.0); n],
             monitor,
         };
         engine.begin_window();
@@ -188,7 +195,7 @@ impl Engine {
 
     /// The run cannot go on.
     pub fn fail(&mut self, why: String) {
-        self.fatal.get_or_insert(why);
+        self.fatal.get_or_insert_with(|| printable(why));
     }
 
     /// Tells something, unless too much has been told this second.
@@ -207,14 +214,21 @@ impl Engine {
         out: &mut impl Outlet,
     ) {
         let paused = self.first_s.is_some() && now_s - self.arrived_s > PAUSE_S;
+        let elapsed_s = if self.first_s.is_some() { now_s - self.arrived_s } else { 0.0 };
+        let rate_hz = self.monitor.config().rate_hz;
         let place = match counter {
+            // Where the pace is not that of the rate, time tells nothing of the counter.
+            Some(counter) if self.check_pace => {
+                self.sequence.place_within(counter, paused, (PLAUSIBLE * (elapsed_s + 1.0) * rate_hz) as i64)
+            }
             Some(counter) => self.sequence.place(counter, paused),
+            None if elapsed_s > self.silence_s => self.sequence.uncounted_anew(),
             None => self.sequence.uncounted(),
         };
         if place == Place::Dropped {
             return;
         }
-        if paused || place == Place::Restarted {
+        if place == Place::Restarted {
             self.pace.interrupt();
         }
         self.arrived(now_s, out);
@@ -231,8 +245,14 @@ impl Engine {
                 self.tell(now_s, format!("{n} samples lost: the window starts anew"), out);
             }
             Place::Restarted => {
+                // Time goes on while nothing comes.
+                self.index = self.index.saturating_add(((elapsed_s * rate_hz) as u64).saturating_sub(1));
                 self.restart(out);
-                self.tell(now_s, format!("the counter started anew at {shown}: the window starts anew"), out);
+                let why = match counter {
+                    Some(_) => format!("the counter started anew at {shown}"),
+                    None => format!("nothing came for {elapsed_s:.1} s"),
+                };
+                self.tell(now_s, format!("{why}: the window starts anew"), out);
             }
             Place::Next | Place::Dropped => {}
         }
@@ -243,8 +263,12 @@ impl Engine {
             let time_s = self.time_s();
             self.alarmed(out, |alarms, tell| alarms.count(time_s, lost, tell));
         }
-        if self.pace.arrived(now_s, self.index) && counter.is_some() {
-            self.contradicted(now_s, out);
+        if counter.is_some() {
+            match self.pace.arrived(now_s, self.index) {
+                Verdict::Fits => {}
+                Verdict::Contradicts => self.contradicted(now_s, out),
+                Verdict::IsOff => self.is_off(now_s, out),
+            }
         }
     }
 
@@ -254,7 +278,13 @@ impl Engine {
             return;
         }
         let silent_s = now_s - self.arrived_s;
-        if silent_s > self.silence_s {
+        if silent_s <= self.silence_s {
+            let time_s = self.time_s();
+            for actuator in 0..self.judged.len() {
+                let unjudged_s = time_s - self.judged[actuator].1;
+                self.alarmed(out, |alarms, tell| alarms.unjudged(actuator, time_s, unjudged_s, tell));
+            }
+        } else {
             if !self.silent {
                 self.silent = true;
                 self.tell(now_s, format!("silent: no sample for {:.1} s", self.silence_s), out);
@@ -268,7 +298,11 @@ impl Engine {
     pub fn reset(&mut self, now_s: f64, out: &mut impl Outlet) {
         let time_s = self.time_at(now_s);
         self.alarmed(out, |alarms, tell| alarms.reset(time_s, tell));
-        self.tell(now_s, "alarms reset".to_owned(), out);
+        let text = match self.alarms.all().iter().filter(|a| a.active).count() {
+            0 => "alarms reset".to_owned(),
+            n => format!("alarms reset; {n} still over the limit"),
+        };
+        self.tell(now_s, text, out);
     }
 
     /// Time of the stream now, when nothing has come since the newest sample.
@@ -318,6 +352,7 @@ impl Engine {
 
     fn restart(&mut self, out: &mut impl Outlet) {
         out.restarted();
+        self.alarms.break_off(None);
         self.monitor.restart(&mut self.state, self.index);
         self.begin_window();
     }
@@ -334,6 +369,7 @@ impl Engine {
         let readings = self.monitor.step(&mut self.state, sample.target, sample.measured);
         if let Some(readings) = readings {
             self.totals.readings += readings.len() as u64;
+            self.totals.valid += readings.iter().filter(|r| r.is_valid()).count() as u64;
             readings.iter().for_each(|reading| out.reading(reading));
             self.totals.tally = self.sequence.tally();
             for reading in readings {
@@ -343,6 +379,21 @@ impl Engine {
                     self.speech.alarm(&change, out);
                 });
                 out.judged(reading, &self.totals, self.alarms.raised(reading.actuator));
+                let still = reading.tracking.reason == Some(Reason::Still);
+                let (was, since_s) = &mut self.judged[reading.actuator];
+                let is = reading.is_valid() || still;
+                if is {
+                    *since_s = reading.time_s;
+                }
+                if is != *was {
+                    *was = is;
+                    let reason = reading.tracking.reason.filter(Reason::is_undetermined);
+                    let text = match reason {
+                        Some(reason) if !still => format!("actuator {}: {reason}", reading.actuator),
+                        _ => format!("actuator {}: determined again", reading.actuator),
+                    };
+                    self.speech.tell(self.arrived_s, reading.time_s, text, out);
+                }
             }
             for (number, alarm) in self.alarms.all().iter().enumerate().filter(|(_, a)| a.actuator.is_some()) {
                 tell_standing(&mut self.told, number, alarm, out);
@@ -382,6 +433,19 @@ impl Engine {
             self.tell(now_s, format!("{told}: time and delay are scaled by that"), out);
         }
     }
+
+    /// Not by so much that the run has to end.
+    fn is_off(&mut self, now_s: f64, out: &mut impl Outlet) {
+        if !self.check_pace || self.pace_told {
+            return;
+        }
+        self.pace_told = true;
+        let (pace, rate) = (self.pace.long_hz(), self.monitor.config().rate_hz);
+        let told = format!(
+            "the counter advances by {pace:.1} a second but --rate says {rate}: time and delay are scaled by that"
+        );
+        self.tell(now_s, told, out);
+    }
 }
 
 /// An alarm that is raised is told each time, for its value; another one when it changes.
@@ -393,6 +457,11 @@ fn tell_standing(told: &mut [(bool, bool)], number: usize, alarm: &Alarm, out: &
     }
 }
 
+/// What a sender or a file has put into a text does not reach a terminal as commands.
+fn printable(text: String) -> String {
+    if text.contains(char::is_control) { text.replace(char::is_control, "\u{fffd}") } else { text }
+}
+
 /// Events, at most so many a second.
 #[derive(Debug, Default)]
 struct Speech {
@@ -402,7 +471,8 @@ struct Speech {
 }
 
 impl Speech {
-    fn tell(&mut self, now_s: f64, time_s: f64, mut text: String, out: &mut impl Outlet) {
+    fn tell(&mut self, now_s: f64, time_s: f64, text: String, out: &mut impl Outlet) {
+        let mut text = printable(text);
         if now_s - self.second >= 1.0 {
             (self.second, self.told) = (now_s, 0);
         }

@@ -122,6 +122,22 @@ impl LineParser {
         Ok(Self { config, delimiter, columns: None, header: String::new(), cells, unwelcome })
     }
 
+    /// What a line must have, in words.
+    pub fn expected(&self) -> String {
+        let place = |column: &Column| match column {
+            Column::Name(name) => format!("'{}'", shown(&[name])),
+            Column::Index(at) => format!("column {at}"),
+        };
+        let of = |columns: &[Column]| columns.iter().map(place).collect::<Vec<_>>().join(", ");
+        let counter = self.config.counter.as_ref().map(|c| format!("a whole-number counter in {}, ", place(c)));
+        format!(
+            "{}target in {} and measured in {}; say where they stand by a layout, or that nothing is counted",
+            counter.unwrap_or_default(),
+            of(&self.config.target),
+            of(&self.config.measured)
+        )
+    }
+
     /// Number of actuators.
     pub fn n_actuators(&self) -> usize {
         self.config.target.len()

@@ -121,6 +121,9 @@ impl Patience {
     }
 }
 
+/// So many lines of which none is a sample end the run.
+const HOPELESS: u64 = 100;
+
 struct Taker {
     patience: Patience,
     parser: LineParser,
@@ -142,7 +145,14 @@ impl Taker {
             Line::Malformed => {
                 engine.malformed();
                 if self.reminded.is_due(now_s, 0) {
-                    engine.tell(now_s, format!("malformed: {}", excerpt(line)), out);
+                    let text = format!("malformed: {}: expected {}", excerpt(line), self.parser.expected());
+                    engine.tell(now_s, text, out);
+                }
+                if engine.totals().malformed == HOPELESS && engine.totals().tally.received == 0 {
+                    engine.fail(format!(
+                        "none of the first {HOPELESS} lines is a sample: expected {}",
+                        self.parser.expected()
+                    ));
                 }
             }
         }

@@ -161,7 +161,7 @@ impl Live {
             file: file.zip(readings_end).map(|((file, path), readings)| (file, path, readings)),
         };
         Ok(Self {
-            page: Arc::new(Page::new(shared.clone(), monitor, board, &config.alarms, &described, &outputs.names)),
+            page: Arc::new(Page::new(shared.clone(), monitor, board, &config.alarms, &described, outputs)),
             shared,
             parts: Mutex::new(Some(parts)),
             threads: Mutex::new(Vec::new()),

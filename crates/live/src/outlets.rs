@@ -91,12 +91,16 @@ impl Sender {
         };
         let socket = UdpSocket::bind(from)?;
         socket.set_nonblocking(true)?;
+        // Only an address that is one is refused without it.
+        socket.set_broadcast(true)?;
         Ok(Self { socket, to })
     }
 
     fn send(&self, text: &str, shared: &Shared) {
-        if self.socket.send_to(text.as_bytes(), self.to).is_err() {
-            shared.unsent.fetch_add(1, Relaxed);
+        if let Err(error) = self.socket.send_to(text.as_bytes(), self.to)
+            && shared.unsent.fetch_add(1, Relaxed) == 0
+        {
+            shared.remark(format!("nothing can be sent to {}: {error}; what is not sent is counted", self.to));
         }
     }
 }

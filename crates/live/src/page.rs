@@ -7,6 +7,7 @@ use rthstrack::{Estimator, Monitor};
 use crate::alarm::AlarmConfig;
 use crate::board::{Board, Event};
 use crate::json::{self, boolean, key, list, number, optional, text, whole};
+use crate::settings::OutputsConfig;
 use crate::shared::{Shared, locked};
 use crate::spectrum::{Spectra, windows};
 
@@ -14,7 +15,8 @@ use crate::spectrum::{Spectra, windows};
 const SCOPE_HZ: f64 = 512.0;
 /// And how much of the past is sent to a new page, a window at least.
 const SCOPE_S: f64 = 10.0;
-const STATUS_EVENTS: usize = 20;
+/// Events that the terminal is told each time: as many as alarms may come at once.
+const STATUS_EVENTS: usize = 256;
 
 /// Everything that is looked at.
 pub(crate) struct Page {
@@ -33,12 +35,12 @@ impl Page {
         board: Board,
         limits: &AlarmConfig,
         source: &str,
-        names: &[String],
+        outputs: &OutputsConfig,
     ) -> Self {
         Self {
             spectra: Mutex::new(Spectra::new(monitor.evaluator())),
             board: Mutex::new(board),
-            hello: hello(&monitor, limits, source, names),
+            hello: hello(&monitor, limits, source, outputs),
             stride: (monitor.evaluated_rate_hz() / SCOPE_HZ).ceil().max(1.0) as u64,
             shared,
             monitor,
@@ -116,8 +118,10 @@ impl Page {
             ("filled", tally.filled),
             ("restarts", tally.restarts),
             ("readings", totals.readings),
+            ("valid", totals.valid),
             ("log_dropped", summary.log_dropped),
             ("unsent", summary.unsent),
+            ("not_written", summary.not_written),
         ];
         for (name, count) in counts {
             key(out, name);
@@ -183,7 +187,7 @@ fn event(out: &mut String, event: &Event) {
     out.push('}');
 }
 
-fn hello(monitor: &Monitor, limits: &AlarmConfig, source: &str, names: &[String]) -> String {
+fn hello(monitor: &Monitor, limits: &AlarmConfig, source: &str, outputs: &OutputsConfig) -> String {
     let config = monitor.config();
     let mut made = String::from("{");
     let out = &mut made;
@@ -208,9 +212,14 @@ fn hello(monitor: &Monitor, limits: &AlarmConfig, source: &str, names: &[String]
     key(out, "n_actuators");
     whole(out, config.n_actuators as u64);
     key(out, "names");
-    list(out, 0..config.n_actuators, |out, a| match names.get(a) {
+    list(out, 0..config.n_actuators, |out, a| match outputs.names.get(a) {
         Some(name) => text(out, name),
         None => text(out, &format!("actuator {a}")),
+    });
+    key(out, "units");
+    list(out, 0..config.n_actuators, |out, a| match outputs.units.get(a) {
+        Some(Some(unit)) => text(out, unit),
+        _ => out.push_str("null"),
     });
     key(out, "source");
     text(out, source);
@@ -223,6 +232,7 @@ fn hello(monitor: &Monitor, limits: &AlarmConfig, source: &str, names: &[String]
         ("critical_fraction", limits.critical_delay_s.map(|_| limits.critical_fraction)),
         ("lost", limits.limit_lost.map(|n| n as f64)),
         ("silence_s", limits.silence_s),
+        ("unjudged_s", limits.unjudged_s),
     ] {
         key(out, name);
         optional(out, value);

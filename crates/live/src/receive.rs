@@ -1,7 +1,7 @@
 //! The receiving thread: datagrams in, readings out. It waits for nothing but the socket.
 
 use std::io::ErrorKind;
-use std::net::{IpAddr, SocketAddr, UdpSocket};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
@@ -29,6 +29,11 @@ pub(crate) fn bind(address: SocketAddr) -> std::io::Result<UdpSocket> {
     // Less is better than nothing: the counter tells what is lost.
     let _ = socket.set_recv_buffer_size(BUFFER);
     socket.bind(&address.into())?;
+    match address.ip() {
+        IpAddr::V4(ip) if ip.is_multicast() => socket.join_multicast_v4(&ip, &Ipv4Addr::UNSPECIFIED)?,
+        IpAddr::V6(ip) if ip.is_multicast() => socket.join_multicast_v6(&ip, 0)?,
+        _ => {}
+    }
     let socket = UdpSocket::from(socket);
     socket.set_read_timeout(Some(TIMEOUT))?;
     Ok(socket)
@@ -95,10 +100,11 @@ impl Receiver {
     /// Receives until it is stopped or cannot go on.
     pub(crate) fn run(self, mut engine: Engine, mut out: Outlets, mut rounds: Rounds) {
         let shared = rounds.shared.clone();
-        let mut datagram = vec![0; MAX_DATAGRAM + 1];
+        // Room for more than is taken: what is cut off would look whole.
+        let mut datagram = vec![0; 1 << 16];
         let mut values = [vec![0.0; self.layout.n_actuators()], vec![0.0; self.layout.n_actuators()]];
         let mut errors = 0;
-        let mut reminded = Reminded::default();
+        let (mut reminded, mut senders) = (Reminded::default(), Senders::default());
         loop {
             let found = self.socket.recv_from(&mut datagram);
             let now_s = shared.now_s();
@@ -106,6 +112,13 @@ impl Receiver {
                 Ok((len, from)) => {
                     errors = 0;
                     if self.accepts(from) {
+                        if let Some(other) = senders.other(now_s, from) {
+                            let text = format!(
+                                "datagrams come from {from} and from {other}: two senders make no sense of the counter; \
+                                 end one of them, or accept only one machine"
+                            );
+                            engine.tell(now_s, text, &mut out);
+                        }
                         self.take(now_s, &datagram[..len], &mut values, &mut engine, &mut out, &mut reminded);
                     } else {
                         engine.refused();
@@ -147,7 +160,7 @@ impl Receiver {
         out: &mut Outlets,
         reminded: &mut Reminded,
     ) {
-        let Some(n) = self.layout.n_samples(datagram.len()) else {
+        let Some(n) = self.layout.n_samples(datagram.len()).filter(|_| datagram.len() <= MAX_DATAGRAM) else {
             engine.malformed();
             if reminded.is_due(now_s, 1) {
                 let text =
@@ -175,6 +188,31 @@ impl Receiver {
     }
 }
 
+/// Who sends: the last two, and when the other of them last did.
+#[derive(Debug, Default)]
+struct Senders {
+    last: Option<SocketAddr>,
+    other: Option<(SocketAddr, f64)>,
+    told_s: Option<f64>,
+}
+
+impl Senders {
+    /// The other sender, where two take turns within a second; once a minute.
+    fn other(&mut self, now_s: f64, from: SocketAddr) -> Option<SocketAddr> {
+        let last = self.last.replace(from)?;
+        if last == from {
+            return None;
+        }
+        let takes_turns = self.other.is_some_and(|(other, at_s)| other == from && now_s - at_s < 1.0);
+        self.other = Some((last, now_s));
+        let is_due = self.told_s.is_none_or(|told_s| now_s - told_s >= REMIND_S);
+        (takes_turns && is_due).then(|| {
+            self.told_s = Some(now_s);
+            last
+        })
+    }
+}
+
 /// When something was last told.
 #[derive(Debug, Default)]
 pub(crate) struct Reminded([Option<f64>; 3]);
@@ -186,5 +224,20 @@ impl Reminded {
             self.0[what] = Some(now_s);
         }
         due
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_senders_that_take_turns_are_told_once_and_one_that_moved_is_not() {
+        let at = |port| SocketAddr::from(([127, 0, 0, 1], port));
+        let mut senders = Senders::default();
+        let mut told = |now_s, port| senders.other(now_s, at(port));
+        assert_eq!([(0.0, 1), (0.1, 1), (5.0, 2), (5.1, 2), (9.0, 1), (9.1, 1)].map(|(t, p)| told(t, p)), [None; 6]);
+        assert_eq!(told(9.2, 2), Some(at(1)));
+        assert_eq!(told(9.3, 1), None, "once a minute");
     }
 }

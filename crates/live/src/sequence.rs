@@ -4,11 +4,12 @@
 //! ticks of a faster clock, is no counter in this sense: with it every sample would follow a gap, or none would be a count.
 
 /// How far back it is known which samples came.
-const MEMORY: i64 = 1024;
+/// The longest datagram may be copied or overtaken whole.
+const MEMORY: i64 = 16_384;
 /// A jump forward by more than this (48 days at 1024 Hz) is a counter that started anew, not a loss.
 const FARTHEST: i64 = 1 << 32;
 /// So many samples in a row that have all been seen are a counter that started anew, not copies.
-const REPLAYED: u32 = 256;
+const REPLAYED: u32 = 4096;
 
 /// Totals. `received` counts every sample once, so that received + lost is what the sender counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -77,16 +78,28 @@ impl Sequence {
         Place::Next
     }
 
+    /// The same after a silence: what came before does not go on.
+    pub fn uncounted_anew(&mut self) -> Place {
+        self.tally.received += 1;
+        self.tally.restarts += 1;
+        Place::Restarted
+    }
+
     /// Where the sample `counter` belongs. After a pause (`paused`) a counter that is behind has started anew: nothing
     /// overtakes for that long.
     pub fn place(&mut self, counter: i64, paused: bool) -> Place {
+        self.place_within(counter, paused, FARTHEST)
+    }
+
+    /// The same where a jump ahead by more than `farthest` is a counter that started anew: no sender has got that far.
+    pub fn place_within(&mut self, counter: i64, paused: bool, farthest: i64) -> Place {
         self.signed |= counter < 0;
         let Some((sent, newest)) = self.newest else {
             self.begin(counter);
             return Place::Next;
         };
         let step = self.difference(counter, sent);
-        if step > FARTHEST || step <= -MEMORY || (step < 0 && paused) {
+        if step > farthest.min(FARTHEST) || step <= -MEMORY || (step < 0 && paused) {
             return self.restart(counter);
         }
         // Unwrapped counters start at zero and grow by at most FARTHEST a sample.
@@ -232,9 +245,33 @@ mod tests {
 
     #[test]
     fn a_counter_that_goes_back_far_has_started_anew() {
-        let (places, tally) = fed(64, 3, &[5000, 5001, 0, 1, 2]);
+        let (places, tally) = fed(64, 3, &[50_000, 50_001, 0, 1, 2]);
         assert_eq!(places[2..], [Place::Restarted, Place::Next, Place::Next]);
         assert_eq!(tally, Tally { received: 5, restarts: 1, ..Tally::default() });
+    }
+
+    #[test]
+    fn the_longest_datagram_may_come_twice_or_be_overtaken() {
+        let mut sequence = Sequence::new(64, 3);
+        // The second comes twice, and the fourth after the fifth.
+        for from in [0, 2729, 2729, 2 * 2729, 4 * 2729, 3 * 2729, 5 * 2729] {
+            (from..from + 2729).for_each(|c| {
+                sequence.place(c, false);
+            });
+        }
+        let tally = sequence.tally();
+        assert_eq!((tally.received, tally.repeated, tally.reordered, tally.lost), (6 * 2729, 2729, 2729, 0));
+        // The fourth's absence was a gap too long to be filled.
+        assert_eq!(tally.restarts, 1);
+    }
+
+    #[test]
+    fn a_jump_ahead_beyond_what_time_allows_is_a_new_start() {
+        let mut sequence = Sequence::new(64, 3);
+        assert_eq!(sequence.place(0, false), Place::Next);
+        assert_eq!(sequence.place_within(5000, false, 4000), Place::Restarted);
+        assert_eq!(sequence.place_within(8000, false, 4000), Place::AfterLoss(2999));
+        assert_eq!(sequence.tally().lost, 2999);
     }
 
     #[test]
@@ -256,7 +293,7 @@ mod tests {
     #[test]
     fn a_short_record_played_again_without_a_pause_is_found_out() {
         let mut sequence = Sequence::new(64, 3);
-        let places: Vec<Place> = (0..800).chain(0..800).map(|c| sequence.place(c, false)).collect();
+        let places: Vec<Place> = (0..9000).chain(0..9000).map(|c| sequence.place(c, false)).collect();
         assert_eq!(places.iter().filter(|p| **p == Place::Restarted).count(), 1);
         assert_eq!(*places.last().unwrap(), Place::Next);
         assert_eq!(sequence.tally().repeated, u64::from(REPLAYED));

@@ -48,6 +48,8 @@ pub struct OutputsConfig {
     pub page: bool,
     /// What the page calls the actuators; empty for "actuator 0" and so on.
     pub names: Vec<String>,
+    /// In which units their displacements are, where that is known; empty for none.
+    pub units: Vec<Option<String>>,
 }
 
 /// Everything that is needed for a run.
@@ -75,10 +77,10 @@ impl LiveConfig {
     pub fn read(monitor: &Value, source: &Value, alarms: &Value, outputs: &Value) -> Result<Self, Vec<String>> {
         let mut mistakes = Vec::new();
         let monitor = read_monitor(&mut Keys::new(&mut mistakes, "monitor", monitor));
-        let alarms = read_alarms(&mut Keys::new(&mut mistakes, "alarms", alarms));
+        let alarms = read_alarms(&mut Keys::new(&mut mistakes, "alarms", alarms), monitor.window_s);
         let outputs = read_outputs(&mut Keys::new(&mut mistakes, "outputs", outputs));
         let mut keys = Keys::new(&mut mistakes, "source", source);
-        let fill_samples = keys.whole("fill_samples").unwrap_or(8);
+        let fill_samples = keys.whole("fill_samples").unwrap_or(5);
         let check_pace = keys.flag("check_pace").unwrap_or(true);
         let source = read_source(&mut keys, monitor.n_actuators);
         drop(keys);
@@ -115,6 +117,14 @@ impl LiveConfig {
                 "outputs.names must be {} names, one an actuator, not {}",
                 self.monitor.n_actuators,
                 names.len()
+            ));
+        }
+        let units = &self.outputs.units;
+        if !units.is_empty() && units.len() != self.monitor.n_actuators {
+            found.push(format!(
+                "outputs.units must be {} units, one an actuator, not {}",
+                self.monitor.n_actuators,
+                units.len()
             ));
         }
         let window = (self.monitor.window_s * self.monitor.rate_hz).round();
@@ -242,17 +252,30 @@ fn read_monitor(keys: &mut Keys<'_>) -> MonitorConfig {
     }
 }
 
-fn read_alarms(keys: &mut Keys<'_>) -> AlarmConfig {
+/// An actuator may be without numbers for a window, and for so long.
+const UNJUDGED_S: f64 = 2.0;
+
+fn read_alarms(keys: &mut Keys<'_>, window_s: f64) -> AlarmConfig {
     let usual = AlarmConfig::default();
     // Without a limit is not the same as the default.
     let silence_s = if keys.map.contains_key("silence_s") { keys.number("silence_s") } else { usual.silence_s };
+    let (limit_delay_s, limit_amplitude) = (keys.number("limit_delay_s"), keys.number("limit_amplitude"));
+    let critical_delay_s = keys.number("critical_delay_s");
+    // Who has set a limit is told when nothing watches it.
+    let watched = limit_delay_s.or(limit_amplitude).or(critical_delay_s).is_some();
+    let unjudged_s = if keys.map.contains_key("unjudged_s") {
+        keys.number("unjudged_s")
+    } else {
+        (watched && window_s > 0.0).then_some(window_s + UNJUDGED_S)
+    };
     AlarmConfig {
-        limit_delay_s: keys.number("limit_delay_s"),
-        limit_amplitude: keys.number("limit_amplitude"),
-        critical_delay_s: keys.number("critical_delay_s"),
+        limit_delay_s,
+        limit_amplitude,
+        critical_delay_s,
         critical_fraction: keys.number("critical_fraction").unwrap_or(usual.critical_fraction),
         limit_lost: keys.whole("limit_lost"),
         silence_s,
+        unjudged_s,
         hysteresis: keys.number("hysteresis").unwrap_or(usual.hysteresis),
         minimum_duration_s: keys.number("minimum_duration_s").unwrap_or(usual.minimum_duration_s),
         latch: keys.flag("latch").unwrap_or(usual.latch),
@@ -270,6 +293,15 @@ fn read_outputs(keys: &mut Keys<'_>) -> OutputsConfig {
         names: keys
             .some("names", "a list of names, one an actuator", |value| {
                 value.as_array()?.iter().map(|name| name.as_str().map(str::to_owned)).collect()
+            })
+            .unwrap_or_default(),
+        units: keys
+            .some("units", "a list of units, one an actuator, null where it is not known", |value| {
+                let unit = |value: &Value| match value {
+                    Value::Null => Some(None),
+                    _ => value.as_str().map(|unit| Some(unit.to_owned())),
+                };
+                value.as_array()?.iter().map(unit).collect()
             })
             .unwrap_or_default(),
     }

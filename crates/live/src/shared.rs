@@ -43,7 +43,7 @@ impl Seen {
     }
 }
 
-const N_COUNTS: usize = 10;
+const N_COUNTS: usize = 11;
 
 #[derive(Debug)]
 pub(crate) struct Shared {
@@ -96,9 +96,10 @@ impl Shared {
 
     /// How the engine stands, for all to see.
     pub(crate) fn show(&self, engine: &Engine) {
-        let Totals { tally, malformed, refused, readings, alarms } = engine.totals();
+        let Totals { tally, malformed, refused, readings, valid, alarms } = engine.totals();
         let Tally { received, lost, repeated, reordered, filled, restarts } = tally;
-        let values = [received, lost, repeated, reordered, filled, restarts, malformed, refused, readings, alarms];
+        let values =
+            [received, lost, repeated, reordered, filled, restarts, malformed, refused, readings, valid, alarms];
         for (count, value) in self.counts.iter().zip(values) {
             count.store(value, Relaxed);
         }
@@ -109,11 +110,11 @@ impl Shared {
     }
 
     pub(crate) fn summary(&self) -> Summary {
-        let [received, lost, repeated, reordered, filled, restarts, malformed, refused, readings, alarms] =
+        let [received, lost, repeated, reordered, filled, restarts, malformed, refused, readings, valid, alarms] =
             std::array::from_fn(|i| self.counts[i].load(Relaxed));
         let tally = Tally { received, lost, repeated, reordered, filled, restarts };
         Summary {
-            totals: Totals { tally, malformed, refused, readings, alarms },
+            totals: Totals { tally, malformed, refused, readings, valid, alarms },
             log_dropped: self.log_dropped.load(Relaxed),
             unsent: self.unsent.load(Relaxed),
             not_written: self.not_written.load(Relaxed),

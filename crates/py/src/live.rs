@@ -121,6 +121,7 @@ impl Live {
             ("reordered", tally.reordered),
             ("malformed", totals.malformed),
             ("readings", totals.readings),
+            ("valid", totals.valid),
             ("alarms", totals.alarms),
             ("filled", tally.filled),
             ("restarts", tally.restarts),
