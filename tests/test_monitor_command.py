@@ -103,6 +103,23 @@ def test_all_mistakes_are_told_at_once_a_line_each_and_nothing_is_started(
         ([*UDP, "--window-shape", "hat"], "--window-shape: expected one of boxcar, hann"),
         ([*UDP, "--detrend", "up"], "--detrend: expected one of none, mean, linear"),
         ([*UDP, "--expected-delay", "0.5"], "--expected-delay: expected at most --max-delay, 0.25 s"),
+        (
+            [*UDP, "--limit-delay", "20"],
+            "--limit-delay: 20 s can never be exceeded, for least_squares looks for delays of "
+            "up to --max-delay, 0.25 s: expected less, or a larger --max-delay; in seconds, 20 ms is 0.02",
+        ),
+        ([*UDP, "--limit-delay", "0.25", "--estimator", "aligned"], "--limit-delay: 0.25 s can never be exceeded"),
+        (
+            [*UDP, "--critical-delay", "31"],
+            "--critical-delay: 15.5 s, 0.5 of it, can never be exceeded, for "
+            "least_squares looks for delays of up to --max-delay, 0.25 s: expected less, or a larger --max-delay; in "
+            "seconds, 31 ms is 0.031",
+        ),
+        ([*UDP, "--critical-delay", "0.3", "--critical-fraction", "0.5", "--max-delay", "0.1"], "0.15 s, 0.5 of it,"),
+        (
+            [*UDP, "--limit-delay", "0.2", "--window", "0.5"],
+            "up to a quarter of --window, 0.125 s: expected less, or a larger --window",
+        ),
         ([*UDP, "--limit-delay", "-0.01"], "--limit-delay: expected a positive number"),
         ([*UDP, "--limit-amplitude", "x"], "--limit-amplitude: expected a number, found 'x'"),
         ([*UDP, "--limit-lost", "0"], "--limit-lost: expected a whole number from 1 on"),
@@ -126,6 +143,21 @@ def test_a_mistake_is_one_line_that_names_the_option(
     assert sum(message in line for line in err) == 1
     # What is missing may make other things wrong, but not many.
     assert len(err) <= 2
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--limit-delay", "0.3", "--max-delay", "0.4"],
+        ["--critical-delay", "0.4"],
+        # It has no largest delay.
+        ["--limit-delay", "0.3", "--estimator", "fei"],
+    ],
+)
+def test_a_limit_that_can_be_exceeded_is_taken(
+    capsys: pytest.CaptureFixture[str], fake: type[FakeLive], arguments: list[str]
+) -> None:
+    assert run(capsys, *UDP, *arguments)[0] == 0
 
 
 @pytest.mark.parametrize(

@@ -189,6 +189,7 @@ def checked_plan(args: argparse.Namespace, wrong: Mapping[str, str]) -> Plan:
         mistakes.append("--rate is missing: give the samples a second, --rate HZ")
     layout = _layout(args, mistakes)
     monitor = _monitor(args, layout.n_actuators, mistakes)
+    mistakes += _blind_limits(args, monitor)
     mistakes += _contradictions(args)
     readings = _outputs(args, mistakes)
     if mistakes:
@@ -293,6 +294,31 @@ def _band_mistakes(rate: float, band: tuple[float, ...], p: int | None) -> Itera
         yield f"--band: expected LO below HI, found {low:g} and {high:g}"
     elif high > highest * (1 + 1e-9):
         yield f"--band: expected HI of at most {of_rate}, {highest:g} Hz, found {high:g}"
+
+
+def _blind_limits(args: argparse.Namespace, monitor: Mapping[str, Any]) -> Iterator[str]:
+    """Limits that no reading could ever exceed: a delay that is not looked for makes none, so nothing would be said."""
+    if monitor["estimator"] == "fei":
+        return
+    # A window is compared over the half of it that is left at the largest shift to either side.
+    most, of_which, larger = min(
+        (monitor["max_delay_s"], "--max-delay", "--max-delay"),
+        (monitor["window_s"] / 4, "a quarter of --window", "--window"),
+    )
+    fraction = args.critical_fraction or 0.5
+    critical = None if args.critical_delay is None else fraction * args.critical_delay
+    limits = [
+        ("--limit-delay", args.limit_delay, "", args.limit_delay),
+        ("--critical-delay", critical, f", {fraction:g} of it,", args.critical_delay),
+    ]
+    for option, limit, share, given in limits:
+        if limit is None or limit < most:
+            continue
+        milli = f"; in seconds, {given:g} ms is {given / 1000:g}" if limit / 1000 < most else ""
+        yield (
+            f"{option}: {limit:g} s{share} can never be exceeded, for {monitor['estimator']} looks for delays of up to "
+            f"{of_which}, {most:g} s: expected less, or a larger {larger}{milli}"
+        )
 
 
 def _most_bytes() -> float:
