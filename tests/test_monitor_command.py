@@ -344,6 +344,83 @@ def test_an_alarm_ends_it_with_status_3_where_that_is_asked_for(
     assert status == 0
 
 
+def test_a_sender_that_is_done_is_an_alarm_to_end_with_only_where_silence_is_given(
+    capsys: pytest.CaptureFixture[str], fake: type[FakeLive]
+) -> None:
+    fake.ends_after_s, fake.alarm_after_s, fake.alarm_name = 0.5, 0.2, "silence"
+    status, _, err = run(capsys, *UDP, "--exit-on-alarm")
+    assert status == 0
+    assert any("ALARM at 0.20 s: advisory: no sample for" in line for line in err)
+    assert fake.made.alarms["silence_s"] == 1.0
+    fake.ends_after_s = None
+    assert run(capsys, *UDP, "--exit-on-alarm", "--silence", "0.2", "--duration", 20)[0] == 3
+    assert fake.made.alarms["silence_s"] == 0.2
+
+
+def test_silence_of_zero_is_not_watched(capsys: pytest.CaptureFixture[str], fake: type[FakeLive]) -> None:
+    assert run(capsys, *UDP, "--silence", "0")[0] == 0
+    assert fake.made.alarms["silence_s"] is None
+
+
+def test_an_alarm_that_came_and_went_between_two_looks_ends_it_too(
+    capsys: pytest.CaptureFixture[str], fake: type[FakeLive]
+) -> None:
+    fake.events = (
+        {"time_s": 0.1, "text": "advisory: actuator 0: delay of 21.000 ms, limit 20.000 ms either way"},
+        {"time_s": 0.2, "text": "advisory: actuator 0: alarm 'delay' is over"},
+    )
+    assert run(capsys, *UDP, "--exit-on-alarm")[0] == 3
+    fake.events = fake.events[1:]
+    assert run(capsys, *UDP, "--exit-on-alarm")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("totals", "arguments", "said"),
+    [
+        ({"received": 0}, UDP, "no sample came: no datagram at 127.0.0.1:54321"),
+        ({"received": 0}, ("--listen", "-", "--rate", "8"), "no sample came: no line at standard input"),
+        (
+            {"received": 0, "malformed": 7},
+            UDP,
+            "no sample came: none of the 7 datagrams at 127.0.0.1:54321 was as the layout says",
+        ),
+        (
+            {"received": 0, "refused": 7},
+            UDP,
+            "no sample came: no datagram at 127.0.0.1:54321 but from senders that are not allowed",
+        ),
+        (
+            {"received": 900, "readings": 0},
+            UDP,
+            "nothing was judged: 900 samples came, but never a whole window of 4 s without a gap that restarts it",
+        ),
+        (
+            {"readings": 12, "valid": 0},
+            UDP,
+            "nothing was judged: none of 12 readings was valid; the last: not determined: ambiguous",
+        ),
+    ],
+)
+def test_a_run_that_judged_nothing_says_so_at_the_end(
+    capsys: pytest.CaptureFixture[str],
+    fake: type[FakeLive],
+    totals: dict[str, int],
+    arguments: tuple[str, ...],
+    said: str,
+) -> None:
+    fake.totals, fake.reason = totals, "not determined: ambiguous"
+    status, _, err = run(capsys, *arguments, "--quiet")
+    assert (status, err[-1]) == (0, f"rthstrack: {said}")
+
+
+def test_without_a_count_of_valid_readings_nothing_is_said_of_them(
+    capsys: pytest.CaptureFixture[str], fake: type[FakeLive], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    summary = fake.summary
+    monkeypatch.setattr(fake, "summary", lambda self: {k: v for k, v in summary(self).items() if k != "valid"})
+    assert run(capsys, *UDP, "--quiet")[2] == []
+
+
 def test_it_ends_after_the_duration(capsys: pytest.CaptureFixture[str], fake: type[FakeLive]) -> None:
     fake.ends_after_s = None
     begin = time.monotonic()

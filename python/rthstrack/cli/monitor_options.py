@@ -125,7 +125,8 @@ def _add_alarms(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> None:
     add("--critical-delay", positive, "S", "delay at which the test becomes unstable ('rthstrack simulate' tells it)")
     add("--critical-fraction", positive, "X", "share of --critical-delay that the delay may reach (0.5)")
     add("--limit-lost", count, "N", "most samples lost within a window")
-    add("--silence", positive, "S", "longest time without a sample (1)")
+    add("--silence", not_negative, "S", "longest time without a sample (1; counts for --exit-on-alarm only where it is "
+        "given; 0: watch none)")  # fmt: skip
     add("--hysteresis", _share, "X", "an alarm is over when this share of its limit below it (0.1)")
     add("--alarm-after", not_negative, "S", "raise it only when the limit was exceeded for so long (0)")
     group.add_argument(
@@ -211,7 +212,7 @@ def checked_plan(args: argparse.Namespace, wrong: Mapping[str, str]) -> Plan:
         "critical_delay_s": args.critical_delay,
         "critical_fraction": args.critical_fraction or 0.5,
         "limit_lost": args.limit_lost,
-        "silence_s": args.silence or 1.0,
+        "silence_s": 1.0 if args.silence is None else args.silence or None,
         "hysteresis": 0.1 if args.hysteresis is None else args.hysteresis,
         "minimum_duration_s": args.alarm_after or 0.0,
         "latch": not args.no_latch,
