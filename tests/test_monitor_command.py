@@ -526,15 +526,112 @@ def read_until(file: int, text: bytes) -> bytes:
     return seen
 
 
-def drawn(status: dict[str, Any], names: tuple[str, ...]) -> str:
+def drawn(status: dict[str, Any], names: tuple[str, ...], size: tuple[int, int] = (150, 50), **more: Any) -> str:
     from rich.console import Console
 
     from rthstrack.live.view import shown
 
-    console = Console(width=150, color_system=None)
+    console = Console(width=size[0], color_system=None)
+    events = more.pop("events", ["at 1.00 s: something"])
     with console.capture() as capture:
-        console.print(shown(status, "about", names, ["at 1.00 s: something"], with_keys=False))
+        console.print(shown(status, "about", names, events, with_keys=False, size=size, **more))
     return capture.get()
+
+
+def a_status(n_actuators: int, **changes: Any) -> dict[str, Any]:
+    """A calm status; changes of the reading of every actuator."""
+    reading = {
+        "time_s": 9.0, "amplitude": 1.02, "delay_s": 0.0123, "equivalent_frequency_hz": 2.5,
+        "amplitude_interval": [1.01, 1.03], "delay_interval_s": [0.0121, 0.0125], "valid": True, "reason": None,
+    }  # fmt: skip
+    return {
+        "time_s": 9.0, "state": "running", "health": {"received": 7, "lost": 0, "pace_hz": 512.0, "log": None},
+        "readings": [reading | {"actuator": i} | changes for i in range(n_actuators)], "alarms": [], "events": [],
+    }  # fmt: skip
+
+
+def an_alarm(actuator: int, *, active: bool = True) -> dict[str, Any]:
+    text = f"advisory: actuator {actuator}: delay of 21.000 ms, limit 20.000 ms either way"
+    return {"name": "delay", "actuator": actuator, "active": active, "latched": not active, "text": text}
+
+
+@pytest.mark.parametrize("size", [(80, 24), (120, 24), (60, 12), (40, 8), (200, 90)])
+@pytest.mark.parametrize("raised", [[], [63], list(range(20, 64)), list(range(64))])
+def test_the_view_fits_its_terminal_and_shows_health_and_alarms_first(size: tuple[int, int], raised: list[int]) -> None:
+    names = tuple(f"actuator {i}" for i in range(64))
+    status = a_status(64) | {"alarms": [an_alarm(i, active=i % 2 == 1) for i in raised]}
+    lines = drawn(status, names, size, events=[f"at {i}.00 s: " + 30 * "something " for i in range(6)]).splitlines()
+    assert len(lines) <= size[1]
+    assert max(map(len, lines)) <= size[0]
+    assert lines[1].startswith("running 9.0 s")
+    assert lines[1].endswith("lost") or "lost," in lines[1] or size[0] < 50
+    if raised:
+        assert lines[2].startswith("ALARM advisory: actuator")
+        # What is over now comes before what is held.
+        assert int(re.findall(r"actuator (\d+):", lines[2])[0]) % 2 == 1
+        told = sum(line.startswith("ALARM") for line in lines)
+        more = [int(found[1]) for line in lines if (found := re.match(r"and (\d+) more alarms", line))]
+        assert told + sum(more) == len(raised)
+        in_table = [line for line in lines if re.match(r"actuator \d+ .*12\.3", line)]
+        # Eight lines have no room for a table beside alarms.
+        assert in_table or size[1] == 8
+        assert not in_table or int(in_table[0].split()[1]) == raised[0] or len(in_table) == 64
+    assert "at 5.00 s" in lines[-1]
+
+
+def test_a_narrow_terminal_shows_numbers_without_intervals() -> None:
+    text = drawn(a_status(1), ("north",), (60, 24))
+    north = next(line for line in text.splitlines() if line.startswith("north"))
+    assert north.split() == ["north", "1.0200", "12.300", "2.5", "valid"]
+    assert "12.300 (12.100 to 12.500)" in drawn(a_status(1), ("north",), (110, 24))
+
+
+def test_the_view_tells_which_actuator_has_long_not_been_judged() -> None:
+    from rthstrack.live.view import Judged
+
+    judged = Judged(3, longest_s=6.0)
+    ambiguous = "not determined: ambiguous, delays of 1.5 and -98.5 ms fit equally well; lower max_delay_s below half"
+    assert judged.missing_s(a_status(3) | {"time_s": None}) == {}
+    for now_s in range(20):
+        status = a_status(3, time_s=float(now_s)) | {"time_s": float(now_s)}
+        status["readings"][1] |= {"valid": now_s < 3, "reason": None if now_s < 3 else ambiguous}
+        # One that rests has nothing to be judged by.
+        status["readings"][2] |= {"valid": False, "reason": "not determined: too little motion to judge by"}
+        missing = judged.missing_s(status)
+        assert missing == ({1: now_s - 2.0} if now_s > 8 else {})
+    lines = drawn(status, ("north", "south", "west"), unjudged_s=missing).splitlines()
+    said = "not judged for 17 s: one tone, 1.5 or -98.5 ms: choose with --expected-delay S"
+    assert said in next(line for line in lines if line.startswith("south"))
+    assert "not judged" not in next(line for line in lines if line.startswith("west"))
+    # Samples come, readings do not.
+    judged = Judged(1, longest_s=6.0)
+    for now_s in range(20):
+        missing = judged.missing_s({"time_s": float(now_s), "readings": [None]})
+    assert missing == {0: 19.0}
+
+
+ESCAPES = "\x1b]0;owned\x07\x1b[2J\x9b31m\r\n"
+
+
+def test_what_a_sender_or_a_layout_says_commands_no_terminal(
+    capsys: pytest.CaptureFixture[str], fake: type[FakeLive]
+) -> None:
+    fake.events = ({"time_s": 0.1, "text": f"the line '{ESCAPES}' is no sample"},)
+    _, _, err = run(capsys, *UDP)
+    assert err[-1] == "rthstrack: at 0.10 s: the line '\\x1b]0;owned\\x07\\x1b[2J\\x9b31m\\r\\n' is no sample"
+    status = a_status(1, valid=False, reason=ESCAPES)
+    status["health"]["log"] = ESCAPES
+    status["alarms"] = [an_alarm(0) | {"text": f"advisory: {ESCAPES}"}]
+    text = drawn(status, (ESCAPES,), events=[ESCAPES])
+    assert text.count("\\x1b]0;owned") >= 4
+    assert all(c.isprintable() or c == "\n" for c in text)
+
+
+def test_what_could_not_be_sent_or_written_is_in_the_view() -> None:
+    status = a_status(1)
+    assert "could not" not in drawn(status, ("north",))
+    status["health"] |= {"unsent": 3, "not_written": 4}
+    assert "3 datagrams could not be sent, 4 readings could not be written" in drawn(status, ("north",))
 
 
 def test_the_view_tells_what_is_not_valid_not_there_and_over_with_the_names_of_the_layout() -> None:

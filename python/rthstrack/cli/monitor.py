@@ -14,6 +14,7 @@ from rthstrack.cli import addresses
 from rthstrack.cli.monitor_options import Plan, add_options, checked_plan
 from rthstrack.cli.running import Ended, say
 from rthstrack.errors import RthstrackError, SettingError
+from rthstrack.live import printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -79,7 +80,7 @@ def run(args: argparse.Namespace, wrong: Mapping[str, str]) -> int:
             say(", ".join(others))
     fatal = live.fatal()
     if fatal is not None:
-        raise RthstrackError(fatal)
+        raise RthstrackError(printable(fatal))
     nothing = _nothing_judged(plan, live, summary, seen.status)
     if nothing is not None:
         say(nothing)
@@ -206,7 +207,7 @@ def _watch(
     if args.view or (stream is sys.stdout and not args.quiet):
         from rthstrack.live.view import View
 
-        with View(stream, about, plan.layout.names) as view:
+        with View(stream, about, plan.layout.names, plan.monitor["window_s"]) as view:
             for status in statuses:
                 fresh = list(news.of(status))
                 viewed += [text for text, is_alarm in fresh if is_alarm]
