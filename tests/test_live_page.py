@@ -761,8 +761,14 @@ def test_connections_that_ask_nothing_are_bounded_and_dropped(
         ("http://rebound.example/", "GET", {}, 403),
         ("/", "GET", {"Host": None}, 403),
         ("/", "GET", {"Host": ""}, 403),
-        ("/", "GET", {"Host": "127.0.0.1"}, 403),
-        ("/", "GET", {"Host": "127.0.0.1:1"}, 403),
+        # The near end of a tunnel has a port of its own.
+        ("/", "GET", {"Host": "127.0.0.1"}, 200),
+        ("/events", "HEAD", {"Host": "localhost:9000", "Origin": "http://localhost:9000"}, 200),
+        ("/", "GET", {"Host": "[::1]:9000"}, 200),
+        ("/", "GET", {"Host": "127.0.0.1:x"}, 403),
+        ("/", "GET", {"Host": "evil.example@localhost:9000"}, 403),
+        ("/", "GET", {"Host": "localhost:9000:9000"}, 403),
+        ("/events", "GET", {"Origin": "http://127.0.0.1:9000"}, 403),  # another page of this machine
         ("/", "GET", {"Host": "rebound.example:{port}"}, 403),
         ("/events", "GET", {"Host": "rebound.example:{port}"}, 403),
         ("/", "GET", {"Host": "127.0.0.1.example:{port}"}, 403),
@@ -820,6 +826,7 @@ def test_other_names_are_accepted_only_where_they_are_listed(serve: Callable[...
     assert page.url == f"http://127.0.0.1:{port}/"
     assert ask(page, Host=f"lab.example:{port}").status == 200
     assert ask(page, Host=f"LAB.example:{port}").status == 200
+    assert ask(page, Host="lab.example:9000").status == 200
     assert ask(page, Host=f"other.example:{port}").status == 403
 
 
