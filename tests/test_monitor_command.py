@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import re
@@ -19,7 +20,7 @@ import pytest
 
 from fake_live import FakeLive
 from rthstrack import _core
-from rthstrack.cli import main
+from rthstrack.cli import addresses, main
 from rthstrack.errors import SettingError
 from rthstrack.readers.arrow import END_OF_STREAM
 
@@ -126,6 +127,11 @@ def test_all_mistakes_are_told_at_once_a_line_each_and_nothing_is_started(
         ([*UDP, "--silence", "inf"], "--silence: expected a finite number"),
         ([*UDP, "--alarm-to", "127.0.0.1:5"], "--alarm-to: expected udp://HOST:PORT"),
         ([*UDP, "--page", "x"], "--page: expected a port"),
+        ([*UDP, "--page-name", "lab"], "--page-name speaks of --page"),
+        ([*UDP, "--page", "0", "--page-name", "http://lab/"], "--page-name: expected the name of a machine"),
+        ([*UDP, "--page", "0", "--page-name", "lab:80"], "--page-name: expected the name of a machine"),
+        ([*UDP, "--log", "/dev/full"], "--log: /dev/full: is a pipe or a device"),
+        ([*UDP, "--readings", "/dev/null"], "--readings: /dev/null: is a pipe or a device"),
         ([*UDP, "--duration", "0"], "--duration: expected a positive number"),
         ([*UDP, "--readings", "a", "--readings", "b"], "--readings: expected at most one file and one address"),
         ([*UDP, "--readings", "a.arrows", "--log", "a.arrows"], "--readings and --log name the same file"),
@@ -176,13 +182,31 @@ def test_what_the_compiled_part_refuses_is_told_in_a_line(
 
 
 def test_a_log_that_cannot_be_written_at_the_start_is_told_in_a_line(
-    capsys: pytest.CaptureFixture[str], fake: type[FakeLive]
+    capsys: pytest.CaptureFixture[str], fake: type[FakeLive], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    status, out, err = run(capsys, *UDP, "--log", "/dev/full")
+    def full(file: int, message: Any) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    path = tmp_path / "run.arrows"
+    monkeypatch.setattr(os, "write", full)
+    status, out, err = run(capsys, *UDP, "--log", path)
     assert (status, out) == (1, "")
     (line,) = err
-    assert "--log: /dev/full: cannot be written: No space left on device" in line
+    assert f"--log: {path}: cannot be written: No space left on device" in line
     assert fake.made.ended.is_set()
+
+
+@pytest.mark.parametrize("option", ["--readings", "--log"])
+def test_a_pipe_that_nobody_reads_is_refused_and_not_waited_for(option: str, tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with started(*UDP, option, pipe) as process:
+        try:
+            _, err = process.communicate(timeout=20)
+        finally:
+            process.kill()
+    assert process.returncode == 2
+    assert f"{option}: {pipe}: is a pipe or a device" in err
 
 
 # What is handed over --------------------------------------------------------------------------------------------------
@@ -271,6 +295,22 @@ def test_p_is_the_largest_power_of_two_with_the_band_within_a_quarter_of_the_rat
 def test_p_leaves_a_sample_for_every_reading(capsys: pytest.CaptureFixture[str], fake: type[FakeLive]) -> None:
     run(capsys, *UDP, "--band", 0, 1, "--update", 64)
     assert fake.made.monitor["data_decimation"] == 16
+
+
+@pytest.mark.parametrize(
+    ("text", "host", "is_loopback"),
+    [
+        ("udp://[fe80::1%1]:5005", "[fe80::1%1]:5005", False),
+        ("udp://[::1]:5005", "[::1]:5005", True),
+        ("udp://127.0.0.1:5005", "127.0.0.1:5005", True),
+    ],
+)
+def test_a_link_local_address_keeps_its_interface(text: str, host: str, is_loopback: bool) -> None:
+    assert addresses.udp(text) == host
+    assert addresses.is_loopback(host) is is_loopback
+    # Where a sender sits is not told by its interface.
+    assert addresses.senders("fe80::1%1") == ["fe80::1"]
+    assert addresses.host("fe80::1%1") == "fe80::1%1"
 
 
 # What is said ---------------------------------------------------------------------------------------------------------
@@ -693,6 +733,18 @@ def test_a_page_whose_port_is_taken_is_a_line_and_status_1(
     assert len(err) == 1
     assert "--page: " in err[0]
     assert "in use" in err[0]
+
+
+def test_a_name_for_the_page_is_handed_to_it(
+    capsys: pytest.CaptureFixture[str], fake: type[FakeLive], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rthstrack.live import page
+
+    given: list[Any] = []
+    made = page.Page
+    monkeypatch.setattr(page, "Page", lambda *arguments: given.append(arguments[3]) or made(*arguments))
+    assert run(capsys, *UDP, "--page", 0, "--page-name", "lab.example", "--page-name", "rig")[0] == 0
+    assert given == [["lab.example", "rig"]]
 
 
 def test_a_page_is_served_at_the_address_that_is_told(capsys: pytest.CaptureFixture[str], fake: type[FakeLive]) -> None:

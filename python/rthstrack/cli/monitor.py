@@ -17,7 +17,7 @@ from rthstrack.errors import RthstrackError, SettingError
 from rthstrack.live import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from rthstrack._core import Live
     from rthstrack.live.log import Log
@@ -147,7 +147,7 @@ def _monitored(args: argparse.Namespace, plan: Plan, live: Live, ended: Ended, s
         cleanup.callback(live.stop)
         page = None
         if args.page is not None:
-            page = _page(live, args.page, args.page_host or "127.0.0.1")
+            page = _page(live, args.page, args.page_host or "127.0.0.1", args.page_name or ())
             cleanup.callback(page.stop)
         log = _log(args, plan, live)
         if log is not None:
@@ -187,11 +187,11 @@ def _log(args: argparse.Namespace, plan: Plan, live: Live) -> Log | None:
         ) from None
 
 
-def _page(live: Live, port: int, host: str) -> Any:
+def _page(live: Live, port: int, host: str, names: Sequence[str]) -> Any:
     from rthstrack.live.page import Page  # type: ignore[import-not-found, unused-ignore]
 
     try:
-        return Page(live, port, host)
+        return Page(live, port, host, names)
     except SettingError as error:
         # A port that is taken is no misuse.
         raise RthstrackError(f"--page: {error}") from None

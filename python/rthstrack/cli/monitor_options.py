@@ -147,6 +147,8 @@ def _add_output(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> None:
     add("--page", addresses.port, "PORT", f"a live page for browsers ({_PAGE_PORT}; 0: a free port)", nargs="?",
         const=_PAGE_PORT)  # fmt: skip
     add("--page-host", addresses.host, "HOST", "address that the page is served at (127.0.0.1: this machine only)")
+    add("--page-name", addresses.host_name, "HOST", "a name by which browsers call this machine, besides localhost and "
+        "its addresses; may be repeated", action="append")  # fmt: skip
     add("--duration", positive, "S", "end after so long")
     how = group.add_mutually_exclusive_group()
     how.add_argument(
@@ -335,8 +337,9 @@ def _contradictions(args: argparse.Namespace) -> Iterator[str]:
     """Options that speak of another one that is not there."""
     if args.critical_fraction is not None and args.critical_delay is None:
         yield "--critical-fraction speaks of --critical-delay: give it too"
-    if args.page_host is not None and args.page is None:
-        yield "--page-host speaks of --page: give it too"
+    for option in ("page_host", "page_name"):
+        if getattr(args, option) is not None and args.page is None:
+            yield f"--{option.replace('_', '-')} speaks of --page: give it too"
     if args.listen == "-":
         for option in ("allow", "any_pace"):
             if getattr(args, option):
@@ -377,6 +380,9 @@ def _not_writable(path: Path, *, may_hold_something: bool) -> Iterator[str]:
     try:
         if path.is_dir():
             yield "is a directory; expected the name of a file"
+        elif path.exists() and not path.is_file():
+            # Opening a pipe waits for whoever reads it; the test would not be watched meanwhile.
+            yield "is a pipe or a device; expected the name of a file, new or to be added to"
         elif path.is_file() and path.stat().st_size and not may_hold_something:
             yield "is there already and holds something: nothing is overwritten; choose another name"
         elif not path.parent.is_dir():
