@@ -26,6 +26,7 @@ from rthstrack.readers.arrow import END_OF_STREAM
 
 FAKE = Path(__file__).with_name("fake_live.py")
 UDP = ("--listen", "udp://127.0.0.1:0", "--rate", "1024")
+LINES = ("--listen", "-", "--rate", "100")
 KEYS = ["received", "lost", "repeated", "reordered", "malformed", "readings", "alarms"]
 
 
@@ -132,6 +133,19 @@ def test_all_mistakes_are_told_at_once_a_line_each_and_nothing_is_started(
         ([*UDP, "--page", "0", "--page-name", "lab:80"], "--page-name: expected the name of a machine"),
         ([*UDP, "--log", "/dev/full"], "--log: /dev/full: is a pipe or a device"),
         ([*UDP, "--readings", "/dev/null"], "--readings: /dev/null: is a pipe or a device"),
+        ([*UDP, "--target", "x", "--measured", "y"], "--target and --measured name columns of lines: give --listen -"),
+        ([*LINES, "--target", "x"], "--measured: expected one for each --target, found 0 for 1"),
+        ([*LINES, "--measured", "x"], "--measured: expected one for each --target, found 1 for 0"),
+        (
+            [*LINES, "--target", "x", "--measured", "x"],
+            "--target and --measured: actuator[1].measured: 'x' is the target's column",
+        ),
+        ([*LINES, "--target", "x", "--measured", "counter"], "actuator[1].measured: 'counter' is the counter's column"),
+        ([*LINES, "--target", "x\x1b", "--measured", "y"], "--target: expected a column's name"),
+        ([*LINES, "--target", "x", "--measured", "y", "--actuators", "2"], "--actuators speaks of the default layout"),
+        ([*LINES, "--target", "x", "--measured", "y", "--counter", "n", "--no-counter"], "--counter names what"),
+        ([*LINES, "--counter", "n"], "--counter speaks of columns: give --target and --measured too"),
+        ([*LINES, "--no-counter", "--layout", "none.toml"], "--no-counter speaks of the default layout"),
         ([*UDP, "--duration", "0"], "--duration: expected a positive number"),
         ([*UDP, "--readings", "a", "--readings", "b"], "--readings: expected at most one file and one address"),
         ([*UDP, "--readings", "a.arrows", "--log", "a.arrows"], "--readings and --log name the same file"),
@@ -281,6 +295,32 @@ def test_lines_on_standard_input_come_at_any_pace(capsys: pytest.CaptureFixture[
 
 
 @pytest.mark.parametrize(
+    ("arguments", "columns"),
+    [
+        (["--target", "x", "--measured", "y"], ("counter", ["x"], ["y"])),
+        (["--target", "1", "--measured", "2", "--target", "1", "--measured", "3"], (0, [1, 1], [2, 3])),
+        (["--target", "x", "--measured", "y", "--counter", "n"], ("n", ["x"], ["y"])),
+        (["--target", "0", "--measured", "1", "--no-counter"], (None, [0], [1])),
+        (["--no-counter"], (None, [0], [1])),
+    ],
+)
+def test_columns_of_lines_are_named_without_a_layout(
+    capsys: pytest.CaptureFixture[str], fake: type[FakeLive], arguments: list[str], columns: tuple[Any, ...]
+) -> None:
+    status, _, err = run(capsys, *LINES, *arguments)
+    assert status == 0, err
+    layout = fake.made.source["layout"]
+    assert (layout["counter"], layout["target"], layout["measured"]) == columns
+    assert fake.made.monitor["n_actuators"] == len(columns[1])
+
+
+def test_datagrams_without_a_counter_need_no_layout(capsys: pytest.CaptureFixture[str], fake: type[FakeLive]) -> None:
+    assert run(capsys, *UDP, "--no-counter")[0] == 0
+    layout = fake.made.source["layout"]
+    assert (layout["counter"], layout["sample_bytes"], layout["target"][0]["offset"]) == (None, 16, 0)
+
+
+@pytest.mark.parametrize(
     ("rate", "high", "p"), [(1024, 32, 8), (1024, 33, 4), (4096, 32, 32), (1000, 32, 4), (256, 64, 1), (256, 65, 1)]
 )
 def test_p_is_the_largest_power_of_two_with_the_band_within_a_quarter_of_the_rate_that_is_left(
@@ -337,6 +377,36 @@ def test_where_it_listens_is_told_with_the_port_that_was_free(
     assert "monitoring udp 127.0.0.1:54321: 1 actuator at 1024 Hz" in err[0]
     assert "a datagram 'reset' to udp://127.0.0.1:54322 resets alarms" in err[1]
     assert len(err) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "is_told"),
+    [
+        (["--limit-delay", "0.01"], True),
+        (["--limit-lost", "5"], True),
+        ([], False),
+        (["--limit-delay", "0.01", "--control"], False),
+        (["--limit-delay", "0.01", "--no-latch"], False),
+        (["--limit-delay", "0.01", "--exit-on-alarm"], False),
+    ],
+)
+def test_alarms_that_nobody_can_reset_are_told_at_the_start(
+    capsys: pytest.CaptureFixture[str], fake: type[FakeLive], arguments: list[str], is_told: bool
+) -> None:
+    _, _, err = run(capsys, *UDP, *arguments)
+    assert any("an alarm stays until the end, for there is no way to reset it" in line for line in err) is is_told
+
+
+@pytest.mark.parametrize("are_taken", [True, False])
+def test_units_reach_the_page_where_the_compiled_part_takes_them(
+    capsys: pytest.CaptureFixture[str], fake: type[FakeLive], monkeypatch: pytest.MonkeyPatch, tmp_path: Path,
+    are_taken: bool,
+) -> None:  # fmt: skip
+    path = tmp_path / "layout.toml"
+    path.write_text('fields = ["counter", "target", "measured"]\nunit = "mm"\n')
+    monkeypatch.setattr("rthstrack.cli.monitor_options._UNITS_TO_PAGE", are_taken)
+    assert run(capsys, *UDP, "--layout", path)[0] == 0
+    assert fake.made.outputs.get("units") == (["mm"] if are_taken else None)
 
 
 def test_an_address_that_others_reach_is_told_unless_senders_are_listed(
@@ -894,3 +964,20 @@ def test_lines_on_standard_input_are_read_to_their_end(header: str, tmp_path: Pa
     assert json.loads(done.stdout)["summary"]["received"] == 1024
     last = json.loads(readings.read_text().splitlines()[-1])
     assert last["delay_s"] == pytest.approx(DELAY_S, abs=1e-4)
+
+
+@compiled
+@pytest.mark.parametrize("form", ["csv", "json"])
+def test_lines_with_named_columns_and_no_counter_need_no_layout_file(form: str, tmp_path: Path) -> None:
+    t = np.arange(1024) / RATE_HZ
+    rows = list(zip(t, motion(t), GAIN * motion(t - DELAY_S), strict=True))
+    content = "time,x,y\n" + "".join(f"{a:.17g},{b:.17g},{c:.17g}\n" for a, b, c in rows)
+    if form == "json":
+        content = "".join(json.dumps({"time": a, "x": b, "y": c}) + "\n" for a, b, c in rows)
+    readings = tmp_path / "readings.jsonl"
+    command = [sys.executable, "-m", "rthstrack", "monitor", "--listen", "-", "--rate", "512", "--window", "1",
+               "--target", "x", "--measured", "y", "--no-counter", "--readings", str(readings)]  # fmt: skip
+    done = subprocess.run(command, input=content, capture_output=True, text=True, timeout=30, check=False)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["summary"]["received"] == 1024
+    assert json.loads(readings.read_text().splitlines()[-1])["delay_s"] == pytest.approx(DELAY_S, abs=1e-4)

@@ -32,6 +32,7 @@ _IN_WORDS = {
     "not_written": "readings that the file could not take",
     "unsent": "datagrams that could not be sent",
 }
+_LIMITS = ("limit_delay", "limit_amplitude", "critical_delay", "limit_lost", "silence")
 # The status is looked at so often.
 _PERIOD_S = 0.1
 
@@ -204,7 +205,7 @@ def _watch(
     news = _News(plan.layout.names)
     stream = sys.stdout if sys.stdout.isatty() else sys.stderr
     viewed: list[str] = []
-    if args.view or (stream is sys.stdout and not args.quiet):
+    if _is_viewed(args):
         from rthstrack.live.view import View
 
         with View(stream, about, plan.layout.names, plan.monitor["window_s"]) as view:
@@ -246,6 +247,10 @@ def _statuses(args: argparse.Namespace, live: Live, ended: Ended, seen: _Seen) -
         yield found
     live.stop()
     yield status()
+
+
+def _is_viewed(args: argparse.Namespace) -> bool:
+    return args.view or (sys.stdout.isatty() and not args.quiet)
 
 
 class _News:
@@ -301,6 +306,9 @@ def _addresses(args: argparse.Namespace, plan: Plan, live: Live, page: Any) -> I
         yield f"a datagram 'reset' to udp://{live.control_address()} resets alarms"
     if args.log is not None:
         yield f"log: {args.log}"
+    limited = [option for option in _LIMITS if getattr(args, option)]
+    if limited and not (args.no_latch or args.exit_on_alarm or args.control is not None or _is_viewed(args)):
+        yield "an alarm stays until the end, for there is no way to reset it: --control [PORT], --view or --no-latch"
 
 
 def _line(error: OSError) -> str:

@@ -189,9 +189,11 @@ class LineLayout(_Layout[Column]):
 Layout = DatagramLayout | LineLayout
 
 
-def default_layout(source: Source, n_actuators: int = 1) -> Layout:
+def default_layout(source: Source, n_actuators: int = 1, *, counted: bool = True) -> Layout:
     """What a UDP-send block of Simulink or LabVIEW sends: little-endian doubles counter, target_1, measured_1, ..."""
-    names = ["counter"] + [f"{role}_{i}" for i in range(1, n_actuators + 1) for role in ("target", "measured")]
+    names = ["counter"] * counted + [
+        f"{role}_{i}" for i in range(1, n_actuators + 1) for role in ("target", "measured")
+    ]
     return layout_from({"fields": names}, source)
 
 
