@@ -40,6 +40,9 @@ class FakeLive:
     end_reason: str | None = None
     #: An alarm so long after the start.
     alarm_after_s: float | None = None
+    alarm_name = "delay"
+    #: Why readings are not valid.
+    reason: str | None = None
     events: tuple[dict[str, Any], ...] = ()
     totals: dict[str, int] = {}  # noqa: RUF012
 
@@ -47,7 +50,8 @@ class FakeLive:
         if self.refusal is not None:
             raise self.refusal
         # As the contract has it, no more and no less.
-        assert (set(monitor), set(source), set(alarms), set(outputs)) == (MONITOR, SOURCE, ALARMS, OUTPUTS)
+        assert (set(monitor), set(source), set(alarms)) == (MONITOR, SOURCE, ALARMS)
+        assert set(outputs) - {"units"} == OUTPUTS
         type(self).made = self
         self.monitor, self.source, self.alarms, self.outputs = monitor, source, alarms, outputs
         self.rate_hz, self.n_actuators = monitor["rate_hz"], monitor["n_actuators"]
@@ -91,7 +95,9 @@ class FakeLive:
     def summary(self) -> dict[str, int]:
         keys = ("received", "lost", "repeated", "reordered", "malformed", "readings", "alarms")
         totals = dict.fromkeys((*keys, "filled", "restarts", "refused", "log_dropped"), 0)
-        return totals | {"received": int(self._now_s() * self.rate_hz)} | self.totals
+        readings = self.totals.get("readings", 1)
+        came = {"received": max(1, int(self._now_s() * self.rate_hz)), "readings": readings, "valid": readings}
+        return totals | came | self.totals
 
     def alarmed(self) -> bool:
         return self.alarm_after_s is not None and self._now_s() >= self.alarm_after_s
@@ -105,14 +111,17 @@ class FakeLive:
     def status(self) -> str:
         now_s = self._now_s()
         alarm = {
-            "name": "delay", "actuator": 0, "active": self.alarmed(), "latched": False, "since_s": self.alarm_after_s,
-            "value": 0.021, "limit": 0.02,
+            "name": self.alarm_name, "actuator": 0, "active": self.alarmed(), "latched": False,
+            "since_s": self.alarm_after_s, "value": 0.021, "limit": 0.02,
             "text": "advisory: actuator 0: delay of 21.000 ms, limit 20.000 ms either way",
         }  # fmt: skip
+        if self.alarm_name == "silence":
+            alarm |= {"actuator": None, "text": "advisory: no sample for more than 1.0 s"}
         reading = {
             "index": 0, "time_s": now_s, "centre_s": now_s - 2, "actuator": 0, "amplitude": 1.02, "delay_s": 0.0123,
             "phase_rad": -0.1, "equivalent_frequency_hz": 2.5, "amplitude_interval": [1.01, 1.03],
-            "delay_interval_s": [0.0121, 0.0125], "valid": True, "reason": None,
+            "delay_interval_s": [0.0121, 0.0125], "valid": self.reason is None,
+            "reason": self.reason,
         }  # fmt: skip
         raised = [{"time_s": self.alarm_after_s, "text": alarm["text"]}] if self.alarmed() else []
         log = next(iter(self.log[-1:]), None)

@@ -180,7 +180,7 @@ def test_all_mistakes_of_a_file_are_told_at_once_each_with_its_key(tmp_path: Pat
         f"{path}: actuator[1].target.tipe: no such key (did you mean 'type'?)",
         f"{path}: actuator[1].measured.offset: missing: expected a whole number from 0 on",
         f"{path}: actuator[1].measured.scale: expected a finite number other than zero, found 0",
-        f"{path}: actuator[2].name: expected a text, found ''",
+        f"{path}: actuator[2].name: expected a text without control characters, found ''",
         f"{path}: actuator[2].target: missing: expected a table",
         f"{path}: actuator[2].measured: expected a table, found 16",
         f"{path}: colour: no such key (did you mean 'counter'?)",
@@ -293,3 +293,18 @@ def test_values_that_a_type_does_not_hold_are_told() -> None:
     double = default_layout("udp")
     assert isinstance(double, DatagramLayout)
     double.check_range("measured", 0, np.array([0.0, np.nan, 1e300]))
+
+
+@pytest.mark.parametrize("text", ["north\x1b[2J", "a\nb", "\u202emm", "\x9b31m"])
+def test_a_name_or_unit_that_would_command_a_terminal_is_refused(text: str) -> None:
+    actuator = {"target": {"offset": 8}, "measured": {"offset": 16}}
+    for key in ("name", "unit"):
+        found = mistakes({"counter": "f64", "actuator": [actuator | {key: text}]})
+        assert found[f"actuator[1].{key}"].startswith("expected a text without control characters")
+    assert "actuator[1].target" in mistakes({"counter": 0, "actuator": [{"target": text, "measured": 2}]}, "lines")
+
+
+def test_names_and_units_of_any_language_are_taken() -> None:
+    actuator = {"target": {"offset": 8}, "measured": {"offset": 16}, "name": "Zylinder Süd", "unit": "kN\u202fm"}
+    layout = layout_from({"counter": "f64", "actuator": [actuator]}, "udp")
+    assert (layout.names, layout.units) == (("Zylinder Süd",), ("kN\u202fm",))

@@ -19,6 +19,7 @@ import pytest
 from fake_live import FakeLive
 from rthstrack._core import __version__
 from rthstrack.cli import main
+from rthstrack.errors import RecordingError
 from rthstrack.live.log import Log, readings_path
 from rthstrack.readers.arrow import END_OF_STREAM
 from rthstrack.recording import propose_pair, read_recording
@@ -138,6 +139,45 @@ def test_a_gap_that_was_not_filled_is_nan_when_the_log_is_read(tmp_path: Path) -
     assert recording.rate_hz == RATE
     assert "100 samples in 1 gap(s) are not in the log and are NaN here" in recording.notes
     assert len(propose_pair(recording)[0]) == 2
+
+
+def a_log_file(path: Path, index: np.ndarray, counter: np.ndarray) -> Path:
+    """What a log of one actuator with these samples is."""
+    live = a_live(1)
+    target = np.sin(index[:, None] / 50)
+    live.take_samples = lambda: {  # type: ignore[method-assign]
+        "index": index, "time_s": index / RATE, "counter": counter, "filled": np.zeros(len(index), np.bool_),
+        "target": target, "measured": 0.9 * target,
+    }  # fmt: skip
+    log = Log(live, path, rate_hz=RATE, units=(None,), settings={}, say=[].append)
+    log._write()
+    log.stop()
+    return path
+
+
+def test_a_pause_much_longer_than_the_test_is_no_damage(tmp_path: Path) -> None:
+    # Two seconds, ten minutes of nothing, two seconds.
+    index = np.concatenate([np.arange(4000), np.arange(4000) + 4000 + int(600 * RATE)])
+    recording = read_recording(a_log_file(tmp_path / "run.arrows", index, index))
+    values = recording["target_1"].values
+    assert len(values) == index[-1] + 1
+    assert np.isnan(values[4000 : 4000 + int(600 * RATE)]).all()
+    np.testing.assert_allclose(values[index], np.sin(index / 50), rtol=1e-12)
+
+
+def test_a_gap_that_no_memory_holds_is_one_line(tmp_path: Path) -> None:
+    path = a_log_file(tmp_path / "run.arrows", np.array([0, 1, 1 << 40]), np.arange(3))
+    with pytest.raises(RecordingError, match=r"its index goes from 0 to 1099511627776 in 3 samples: .* GiB"):
+        read_recording(path)
+
+
+def test_where_the_counter_falls_is_told_when_the_log_is_read(tmp_path: Path) -> None:
+    index = np.arange(300)
+    counter = np.concatenate([np.arange(100), np.arange(150), np.arange(50)])
+    notes = read_recording(a_log_file(tmp_path / "run.arrows", index, counter)).notes
+    assert any("its counter falls 2 time(s), at row 100, 250 from 0" in note for note in notes)
+    notes = read_recording(a_log_file(tmp_path / "other.arrows", index, index)).notes
+    assert not any("counter" in note for note in notes)
 
 
 # Killed ---------------------------------------------------------------------------------------------------------------

@@ -39,6 +39,7 @@ class MadeUp:
         self.amplitude = [0.98 + 0.01 * k for k in range(n_actuators)]
         self.reason: list[str | None] = [None] * n_actuators
         self.silent = self.waiting = False
+        self.units: list[str | None] | None = None
         self.health = {"lost": 0, "malformed": 0, "log": "writing"}
         self._alarms: dict[tuple[str, int], dict[str, Any]] = {}
         self._events: list[tuple[int, dict[str, Any]]] = []
@@ -48,7 +49,7 @@ class MadeUp:
         self.frames = 0
 
     def begin_anew(self) -> None:
-        """As if the sender had been started again, its time at zero."""
+        """As if the monitor had been started again, its time at zero."""
         with self._lock:
             self._readings.clear()
             self._started, self._lost_s, self._n = time.monotonic(), 0.0, 0
@@ -78,6 +79,7 @@ class MadeUp:
                 "source": "udp 127.0.0.1:5005",
                 "limits": limits,
             }
+            | ({} if self.units is None else {"units": self.units})
         )
 
     def target(self, t: Any) -> Any:
@@ -423,14 +425,17 @@ def test_no_line_is_drawn_where_there_was_no_reading(serve: Callable[..., Page],
     page.until(f"{DELAYS}.slice(-10).every((v) => v != null) && {DELAYS}.includes(null)")
 
 
-def test_a_sender_that_begins_anew_begins_the_charts_anew(
+def test_a_monitor_that_begins_anew_begins_the_charts_anew(
     serve: Callable[..., Page], opened: Callable[..., Opened]
 ) -> None:
     source = MadeUp(2)
     source.fill(50)
-    page = opened(serve(source))
+    first = serve(source)
+    page = opened(first)
     page.until(f"{DELAYS}.length > 100")
+    first.stop()
     source.begin_anew()
+    serve(source, address(first)[1])
     last = "document.querySelector('[data-chart=\"{}\"]').chart.u.data[0].at(-1)"
     page.until(f"{last.format('delay')} > 0.5 && {last.format('delay')} < 20 && {last.format('scope')} < 20")
     times = page.page.evaluate("Array.from(document.querySelector('[data-chart=\"delay\"]').chart.u.data[0])")
@@ -470,6 +475,85 @@ def test_a_crossed_limit_turns_red_and_latches_until_it_is_reset(
     page.until_alert("calm")
     page.until("document.querySelector('.card .after, .card .over') === null")
     assert "ALARM" not in page.page.title()
+
+
+def test_an_actuator_that_is_not_judged_is_an_alarm_like_the_others(
+    serve: Callable[..., Page], opened: Callable[..., Opened]
+) -> None:
+    source = MadeUp(2)
+    source.fill(5)
+    source.reason[1] = "not determined: ambiguous"
+    alarm = {
+        "name": "unjudged",
+        "actuator": 1,
+        "active": True,
+        "latched": True,
+        "since_s": 5.0,
+        "value": 7.0,
+        "limit": 6.0,
+    }
+    source._alarms["unjudged", 1] = alarm | {"text": "advisory: actuator 1: no valid reading for 7.0 s"}
+    page = opened(serve(source))
+    page.until_alert("active")
+    assert "Not judged · actuator 1" in page.alerts()[0][1]
+    page.until("document.querySelectorAll('.card')[1].querySelector('.verdict').textContent === 'alarm'")
+    source._alarms["unjudged", 1]["active"] = False
+    page.until_alert("latched")
+    page.until("document.querySelectorAll('.card')[1].querySelector('.verdict').textContent === 'latched'")
+
+
+def test_an_alarm_is_spoken_once_whatever_its_numbers_do(
+    serve: Callable[..., Page], opened: Callable[..., Opened]
+) -> None:
+    source = MadeUp(1)
+    source.fill(5)
+    page = opened(serve(source))
+    page.until_state("running")
+    page.page.evaluate(
+        "window.spoken = []; new MutationObserver((all) => window.spoken.push(all[0].target.textContent))"
+        ".observe(document.querySelector('.spoken'), { childList: true, characterData: true, subtree: true })"
+    )
+    assert page.page.evaluate("document.querySelector('.alerts').closest('[aria-live]')") is None
+    assert page.page.evaluate("document.querySelector('.spoken').getAttribute('role')") == "alert"
+    source.delay_s[0] = 0.02
+    page.until_alert("active")
+    for milli in range(21, 25):
+        source._alarms["delay", 0]["text"] = f"delay of {milli} ms"
+        page.until(f"document.querySelector('.alerts').innerText.includes('delay of {milli} ms')")
+    source.delay_s[0] = 0.004
+    page.until_alert("latched")
+    page.until("window.spoken.length > 1")
+    assert page.page.evaluate("window.spoken") == ["Alarm: Delay · actuator 0.", "Latched: Delay · actuator 0."]
+
+
+def test_axes_bear_the_unit_of_the_chosen_actuator(serve: Callable[..., Page], opened: Callable[..., Opened]) -> None:
+    label = "document.querySelector('[data-chart=\"{}\"]').chart.u.axes[{}].label()"
+    axes = [("scope", 1), ("loop", 0), ("loop", 1), ("spectrum-log", 1)]
+    source = MadeUp(2)
+    source.fill(5)
+    page = opened(serve(source))
+    page.until_state("running")
+    named = ["Displacement", "Target", "Measured", "Amplitude"]
+    assert [page.page.evaluate(label.format(*axis)) for axis in axes] == named
+    source.units = ["mm", None]
+    page = opened(serve(source))
+    page.until_state("running")
+    assert [page.page.evaluate(label.format(*axis)) for axis in axes] == [f"{name} (mm)" for name in named]
+    page.page.locator(".card").nth(1).click()
+    assert [page.page.evaluate(label.format(*axis)) for axis in axes] == named
+
+
+def test_what_could_not_be_sent_or_written_is_told_when_there_is_any(
+    serve: Callable[..., Page], opened: Callable[..., Opened]
+) -> None:
+    source = MadeUp(1)
+    source.health |= {"unsent": 0}
+    source.fill(5)
+    page = opened(serve(source))
+    page.until("document.querySelector('.health').innerText.includes('readings')")
+    assert "not sent" not in page.page.locator(".health").inner_text()
+    source.health |= {"unsent": 3, "not_written": 4}
+    page.until("/not sent\\s+3\\s+not written\\s+4/.test(document.querySelector('.health').innerText)")
 
 
 def test_a_lost_connection_shows_within_two_seconds_and_the_page_comes_back_by_itself(
@@ -761,8 +845,14 @@ def test_connections_that_ask_nothing_are_bounded_and_dropped(
         ("http://rebound.example/", "GET", {}, 403),
         ("/", "GET", {"Host": None}, 403),
         ("/", "GET", {"Host": ""}, 403),
-        ("/", "GET", {"Host": "127.0.0.1"}, 403),
-        ("/", "GET", {"Host": "127.0.0.1:1"}, 403),
+        # The near end of a tunnel has a port of its own.
+        ("/", "GET", {"Host": "127.0.0.1"}, 200),
+        ("/events", "HEAD", {"Host": "localhost:9000", "Origin": "http://localhost:9000"}, 200),
+        ("/", "GET", {"Host": "[::1]:9000"}, 200),
+        ("/", "GET", {"Host": "127.0.0.1:x"}, 403),
+        ("/", "GET", {"Host": "evil.example@localhost:9000"}, 403),
+        ("/", "GET", {"Host": "localhost:9000:9000"}, 403),
+        ("/events", "GET", {"Origin": "http://127.0.0.1:9000"}, 403),  # another page of this machine
         ("/", "GET", {"Host": "rebound.example:{port}"}, 403),
         ("/events", "GET", {"Host": "rebound.example:{port}"}, 403),
         ("/", "GET", {"Host": "127.0.0.1.example:{port}"}, 403),
@@ -820,6 +910,7 @@ def test_other_names_are_accepted_only_where_they_are_listed(serve: Callable[...
     assert page.url == f"http://127.0.0.1:{port}/"
     assert ask(page, Host=f"lab.example:{port}").status == 200
     assert ask(page, Host=f"LAB.example:{port}").status == 200
+    assert ask(page, Host="lab.example:9000").status == 200
     assert ask(page, Host=f"other.example:{port}").status == 403
 
 

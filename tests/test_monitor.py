@@ -112,6 +112,14 @@ def test_after_a_restart_it_counts_from_the_given_index(signals):
     assert np.array_equal(first.amplitude, again.amplitude)
 
 
+@pytest.mark.parametrize("index", [-1, 1.5, 1 << 63, "5", None, True, np.nan])
+def test_an_index_that_cannot_be_is_refused(index):
+    monitor = rthstrack.Monitor(RATE_HZ)
+    with pytest.raises(SettingError, match=r"^index must be a whole number from 0 on, not "):
+        monitor.restart(index)
+    monitor.restart(np.int64(7))
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import re
@@ -19,12 +20,13 @@ import pytest
 
 from fake_live import FakeLive
 from rthstrack import _core
-from rthstrack.cli import main
+from rthstrack.cli import addresses, main
 from rthstrack.errors import SettingError
 from rthstrack.readers.arrow import END_OF_STREAM
 
 FAKE = Path(__file__).with_name("fake_live.py")
 UDP = ("--listen", "udp://127.0.0.1:0", "--rate", "1024")
+LINES = ("--listen", "-", "--rate", "100")
 KEYS = ["received", "lost", "repeated", "reordered", "malformed", "readings", "alarms"]
 
 
@@ -103,12 +105,47 @@ def test_all_mistakes_are_told_at_once_a_line_each_and_nothing_is_started(
         ([*UDP, "--window-shape", "hat"], "--window-shape: expected one of boxcar, hann"),
         ([*UDP, "--detrend", "up"], "--detrend: expected one of none, mean, linear"),
         ([*UDP, "--expected-delay", "0.5"], "--expected-delay: expected at most --max-delay, 0.25 s"),
+        (
+            [*UDP, "--limit-delay", "20"],
+            "--limit-delay: 20 s can never be exceeded, for least_squares looks for delays of "
+            "up to --max-delay, 0.25 s: expected less, or a larger --max-delay; in seconds, 20 ms is 0.02",
+        ),
+        ([*UDP, "--limit-delay", "0.25", "--estimator", "aligned"], "--limit-delay: 0.25 s can never be exceeded"),
+        (
+            [*UDP, "--critical-delay", "31"],
+            "--critical-delay: 15.5 s, 0.5 of it, can never be exceeded, for "
+            "least_squares looks for delays of up to --max-delay, 0.25 s: expected less, or a larger --max-delay; in "
+            "seconds, 31 ms is 0.031",
+        ),
+        ([*UDP, "--critical-delay", "0.3", "--critical-fraction", "0.5", "--max-delay", "0.1"], "0.15 s, 0.5 of it,"),
+        (
+            [*UDP, "--limit-delay", "0.2", "--window", "0.5"],
+            "up to a quarter of --window, 0.125 s: expected less, or a larger --window",
+        ),
         ([*UDP, "--limit-delay", "-0.01"], "--limit-delay: expected a positive number"),
         ([*UDP, "--limit-amplitude", "x"], "--limit-amplitude: expected a number, found 'x'"),
         ([*UDP, "--limit-lost", "0"], "--limit-lost: expected a whole number from 1 on"),
         ([*UDP, "--silence", "inf"], "--silence: expected a finite number"),
         ([*UDP, "--alarm-to", "127.0.0.1:5"], "--alarm-to: expected udp://HOST:PORT"),
         ([*UDP, "--page", "x"], "--page: expected a port"),
+        ([*UDP, "--page-name", "lab"], "--page-name speaks of --page"),
+        ([*UDP, "--page", "0", "--page-name", "http://lab/"], "--page-name: expected the name of a machine"),
+        ([*UDP, "--page", "0", "--page-name", "lab:80"], "--page-name: expected the name of a machine"),
+        ([*UDP, "--log", "/dev/full"], "--log: /dev/full: is a pipe or a device"),
+        ([*UDP, "--readings", "/dev/null"], "--readings: /dev/null: is a pipe or a device"),
+        ([*UDP, "--target", "x", "--measured", "y"], "--target and --measured name columns of lines: give --listen -"),
+        ([*LINES, "--target", "x"], "--measured: expected one for each --target, found 0 for 1"),
+        ([*LINES, "--measured", "x"], "--measured: expected one for each --target, found 1 for 0"),
+        (
+            [*LINES, "--target", "x", "--measured", "x"],
+            "--target and --measured: actuator[1].measured: 'x' is the target's column",
+        ),
+        ([*LINES, "--target", "x", "--measured", "counter"], "actuator[1].measured: 'counter' is the counter's column"),
+        ([*LINES, "--target", "x\x1b", "--measured", "y"], "--target: expected a column's name"),
+        ([*LINES, "--target", "x", "--measured", "y", "--actuators", "2"], "--actuators speaks of the default layout"),
+        ([*LINES, "--target", "x", "--measured", "y", "--counter", "n", "--no-counter"], "--counter names what"),
+        ([*LINES, "--counter", "n"], "--counter speaks of columns: give --target and --measured too"),
+        ([*LINES, "--no-counter", "--layout", "none.toml"], "--no-counter speaks of the default layout"),
         ([*UDP, "--duration", "0"], "--duration: expected a positive number"),
         ([*UDP, "--readings", "a", "--readings", "b"], "--readings: expected at most one file and one address"),
         ([*UDP, "--readings", "a.arrows", "--log", "a.arrows"], "--readings and --log name the same file"),
@@ -129,6 +166,21 @@ def test_a_mistake_is_one_line_that_names_the_option(
 
 
 @pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--limit-delay", "0.3", "--max-delay", "0.4"],
+        ["--critical-delay", "0.4"],
+        # It has no largest delay.
+        ["--limit-delay", "0.3", "--estimator", "fei"],
+    ],
+)
+def test_a_limit_that_can_be_exceeded_is_taken(
+    capsys: pytest.CaptureFixture[str], fake: type[FakeLive], arguments: list[str]
+) -> None:
+    assert run(capsys, *UDP, *arguments)[0] == 0
+
+
+@pytest.mark.parametrize(
     ("refusal", "expected"),
     [
         (OSError("cannot listen at 127.0.0.1:5005: Address already in use"), 1),
@@ -144,13 +196,31 @@ def test_what_the_compiled_part_refuses_is_told_in_a_line(
 
 
 def test_a_log_that_cannot_be_written_at_the_start_is_told_in_a_line(
-    capsys: pytest.CaptureFixture[str], fake: type[FakeLive]
+    capsys: pytest.CaptureFixture[str], fake: type[FakeLive], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    status, out, err = run(capsys, *UDP, "--log", "/dev/full")
+    def full(file: int, message: Any) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    path = tmp_path / "run.arrows"
+    monkeypatch.setattr(os, "write", full)
+    status, out, err = run(capsys, *UDP, "--log", path)
     assert (status, out) == (1, "")
     (line,) = err
-    assert "--log: /dev/full: cannot be written: No space left on device" in line
+    assert f"--log: {path}: cannot be written: No space left on device" in line
     assert fake.made.ended.is_set()
+
+
+@pytest.mark.parametrize("option", ["--readings", "--log"])
+def test_a_pipe_that_nobody_reads_is_refused_and_not_waited_for(option: str, tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with started(*UDP, option, pipe) as process:
+        try:
+            _, err = process.communicate(timeout=20)
+        finally:
+            process.kill()
+    assert process.returncode == 2
+    assert f"{option}: {pipe}: is a pipe or a device" in err
 
 
 # What is handed over --------------------------------------------------------------------------------------------------
@@ -225,6 +295,32 @@ def test_lines_on_standard_input_come_at_any_pace(capsys: pytest.CaptureFixture[
 
 
 @pytest.mark.parametrize(
+    ("arguments", "columns"),
+    [
+        (["--target", "x", "--measured", "y"], ("counter", ["x"], ["y"])),
+        (["--target", "1", "--measured", "2", "--target", "1", "--measured", "3"], (0, [1, 1], [2, 3])),
+        (["--target", "x", "--measured", "y", "--counter", "n"], ("n", ["x"], ["y"])),
+        (["--target", "0", "--measured", "1", "--no-counter"], (None, [0], [1])),
+        (["--no-counter"], (None, [0], [1])),
+    ],
+)
+def test_columns_of_lines_are_named_without_a_layout(
+    capsys: pytest.CaptureFixture[str], fake: type[FakeLive], arguments: list[str], columns: tuple[Any, ...]
+) -> None:
+    status, _, err = run(capsys, *LINES, *arguments)
+    assert status == 0, err
+    layout = fake.made.source["layout"]
+    assert (layout["counter"], layout["target"], layout["measured"]) == columns
+    assert fake.made.monitor["n_actuators"] == len(columns[1])
+
+
+def test_datagrams_without_a_counter_need_no_layout(capsys: pytest.CaptureFixture[str], fake: type[FakeLive]) -> None:
+    assert run(capsys, *UDP, "--no-counter")[0] == 0
+    layout = fake.made.source["layout"]
+    assert (layout["counter"], layout["sample_bytes"], layout["target"][0]["offset"]) == (None, 16, 0)
+
+
+@pytest.mark.parametrize(
     ("rate", "high", "p"), [(1024, 32, 8), (1024, 33, 4), (4096, 32, 32), (1000, 32, 4), (256, 64, 1), (256, 65, 1)]
 )
 def test_p_is_the_largest_power_of_two_with_the_band_within_a_quarter_of_the_rate_that_is_left(
@@ -239,6 +335,22 @@ def test_p_is_the_largest_power_of_two_with_the_band_within_a_quarter_of_the_rat
 def test_p_leaves_a_sample_for_every_reading(capsys: pytest.CaptureFixture[str], fake: type[FakeLive]) -> None:
     run(capsys, *UDP, "--band", 0, 1, "--update", 64)
     assert fake.made.monitor["data_decimation"] == 16
+
+
+@pytest.mark.parametrize(
+    ("text", "host", "is_loopback"),
+    [
+        ("udp://[fe80::1%1]:5005", "[fe80::1%1]:5005", False),
+        ("udp://[::1]:5005", "[::1]:5005", True),
+        ("udp://127.0.0.1:5005", "127.0.0.1:5005", True),
+    ],
+)
+def test_a_link_local_address_keeps_its_interface(text: str, host: str, is_loopback: bool) -> None:
+    assert addresses.udp(text) == host
+    assert addresses.is_loopback(host) is is_loopback
+    # Where a sender sits is not told by its interface.
+    assert addresses.senders("fe80::1%1") == ["fe80::1"]
+    assert addresses.host("fe80::1%1") == "fe80::1%1"
 
 
 # What is said ---------------------------------------------------------------------------------------------------------
@@ -265,6 +377,36 @@ def test_where_it_listens_is_told_with_the_port_that_was_free(
     assert "monitoring udp 127.0.0.1:54321: 1 actuator at 1024 Hz" in err[0]
     assert "a datagram 'reset' to udp://127.0.0.1:54322 resets alarms" in err[1]
     assert len(err) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "is_told"),
+    [
+        (["--limit-delay", "0.01"], True),
+        (["--limit-lost", "5"], True),
+        ([], False),
+        (["--limit-delay", "0.01", "--control"], False),
+        (["--limit-delay", "0.01", "--no-latch"], False),
+        (["--limit-delay", "0.01", "--exit-on-alarm"], False),
+    ],
+)
+def test_alarms_that_nobody_can_reset_are_told_at_the_start(
+    capsys: pytest.CaptureFixture[str], fake: type[FakeLive], arguments: list[str], is_told: bool
+) -> None:
+    _, _, err = run(capsys, *UDP, *arguments)
+    assert any("an alarm stays until the end, for there is no way to reset it" in line for line in err) is is_told
+
+
+@pytest.mark.parametrize("are_taken", [True, False])
+def test_units_reach_the_page_where_the_compiled_part_takes_them(
+    capsys: pytest.CaptureFixture[str], fake: type[FakeLive], monkeypatch: pytest.MonkeyPatch, tmp_path: Path,
+    are_taken: bool,
+) -> None:  # fmt: skip
+    path = tmp_path / "layout.toml"
+    path.write_text('fields = ["counter", "target", "measured"]\nunit = "mm"\n')
+    monkeypatch.setattr("rthstrack.cli.monitor_options._UNITS_TO_PAGE", are_taken)
+    assert run(capsys, *UDP, "--layout", path)[0] == 0
+    assert fake.made.outputs.get("units") == (["mm"] if are_taken else None)
 
 
 def test_an_address_that_others_reach_is_told_unless_senders_are_listed(
@@ -310,6 +452,83 @@ def test_an_alarm_ends_it_with_status_3_where_that_is_asked_for(
     assert any("ALARM" in line for line in err)
     status, _, _ = run(capsys, *UDP, "--duration", 0.4)
     assert status == 0
+
+
+def test_a_sender_that_is_done_is_an_alarm_to_end_with_only_where_silence_is_given(
+    capsys: pytest.CaptureFixture[str], fake: type[FakeLive]
+) -> None:
+    fake.ends_after_s, fake.alarm_after_s, fake.alarm_name = 0.5, 0.2, "silence"
+    status, _, err = run(capsys, *UDP, "--exit-on-alarm")
+    assert status == 0
+    assert any("ALARM at 0.20 s: advisory: no sample for" in line for line in err)
+    assert fake.made.alarms["silence_s"] == 1.0
+    fake.ends_after_s = None
+    assert run(capsys, *UDP, "--exit-on-alarm", "--silence", "0.2", "--duration", 20)[0] == 3
+    assert fake.made.alarms["silence_s"] == 0.2
+
+
+def test_silence_of_zero_is_not_watched(capsys: pytest.CaptureFixture[str], fake: type[FakeLive]) -> None:
+    assert run(capsys, *UDP, "--silence", "0")[0] == 0
+    assert fake.made.alarms["silence_s"] is None
+
+
+def test_an_alarm_that_came_and_went_between_two_looks_ends_it_too(
+    capsys: pytest.CaptureFixture[str], fake: type[FakeLive]
+) -> None:
+    fake.events = (
+        {"time_s": 0.1, "text": "advisory: actuator 0: delay of 21.000 ms, limit 20.000 ms either way"},
+        {"time_s": 0.2, "text": "advisory: actuator 0: alarm 'delay' is over"},
+    )
+    assert run(capsys, *UDP, "--exit-on-alarm")[0] == 3
+    fake.events = fake.events[1:]
+    assert run(capsys, *UDP, "--exit-on-alarm")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("totals", "arguments", "said"),
+    [
+        ({"received": 0}, UDP, "no sample came: no datagram at 127.0.0.1:54321"),
+        ({"received": 0}, ("--listen", "-", "--rate", "8"), "no sample came: no line at standard input"),
+        (
+            {"received": 0, "malformed": 7},
+            UDP,
+            "no sample came: none of the 7 datagrams at 127.0.0.1:54321 was as the layout says",
+        ),
+        (
+            {"received": 0, "refused": 7},
+            UDP,
+            "no sample came: no datagram at 127.0.0.1:54321 but from senders that are not allowed",
+        ),
+        (
+            {"received": 900, "readings": 0},
+            UDP,
+            "nothing was judged: 900 samples came, but never a whole window of 4 s without a gap that restarts it",
+        ),
+        (
+            {"readings": 12, "valid": 0},
+            UDP,
+            "nothing was judged: none of 12 readings was valid; the last: not determined: ambiguous",
+        ),
+    ],
+)
+def test_a_run_that_judged_nothing_says_so_at_the_end(
+    capsys: pytest.CaptureFixture[str],
+    fake: type[FakeLive],
+    totals: dict[str, int],
+    arguments: tuple[str, ...],
+    said: str,
+) -> None:
+    fake.totals, fake.reason = totals, "not determined: ambiguous"
+    status, _, err = run(capsys, *arguments, "--quiet")
+    assert (status, err[-1]) == (0, f"rthstrack: {said}")
+
+
+def test_without_a_count_of_valid_readings_nothing_is_said_of_them(
+    capsys: pytest.CaptureFixture[str], fake: type[FakeLive], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    summary = fake.summary
+    monkeypatch.setattr(fake, "summary", lambda self: {k: v for k, v in summary(self).items() if k != "valid"})
+    assert run(capsys, *UDP, "--quiet")[2] == []
 
 
 def test_it_ends_after_the_duration(capsys: pytest.CaptureFixture[str], fake: type[FakeLive]) -> None:
@@ -417,15 +636,112 @@ def read_until(file: int, text: bytes) -> bytes:
     return seen
 
 
-def drawn(status: dict[str, Any], names: tuple[str, ...]) -> str:
+def drawn(status: dict[str, Any], names: tuple[str, ...], size: tuple[int, int] = (150, 50), **more: Any) -> str:
     from rich.console import Console
 
     from rthstrack.live.view import shown
 
-    console = Console(width=150, color_system=None)
+    console = Console(width=size[0], color_system=None)
+    events = more.pop("events", ["at 1.00 s: something"])
     with console.capture() as capture:
-        console.print(shown(status, "about", names, ["at 1.00 s: something"], with_keys=False))
+        console.print(shown(status, "about", names, events, with_keys=False, size=size, **more))
     return capture.get()
+
+
+def a_status(n_actuators: int, **changes: Any) -> dict[str, Any]:
+    """A calm status; changes of the reading of every actuator."""
+    reading = {
+        "time_s": 9.0, "amplitude": 1.02, "delay_s": 0.0123, "equivalent_frequency_hz": 2.5,
+        "amplitude_interval": [1.01, 1.03], "delay_interval_s": [0.0121, 0.0125], "valid": True, "reason": None,
+    }  # fmt: skip
+    return {
+        "time_s": 9.0, "state": "running", "health": {"received": 7, "lost": 0, "pace_hz": 512.0, "log": None},
+        "readings": [reading | {"actuator": i} | changes for i in range(n_actuators)], "alarms": [], "events": [],
+    }  # fmt: skip
+
+
+def an_alarm(actuator: int, *, active: bool = True) -> dict[str, Any]:
+    text = f"advisory: actuator {actuator}: delay of 21.000 ms, limit 20.000 ms either way"
+    return {"name": "delay", "actuator": actuator, "active": active, "latched": not active, "text": text}
+
+
+@pytest.mark.parametrize("size", [(80, 24), (120, 24), (60, 12), (40, 8), (200, 90)])
+@pytest.mark.parametrize("raised", [[], [63], list(range(20, 64)), list(range(64))])
+def test_the_view_fits_its_terminal_and_shows_health_and_alarms_first(size: tuple[int, int], raised: list[int]) -> None:
+    names = tuple(f"actuator {i}" for i in range(64))
+    status = a_status(64) | {"alarms": [an_alarm(i, active=i % 2 == 1) for i in raised]}
+    lines = drawn(status, names, size, events=[f"at {i}.00 s: " + 30 * "something " for i in range(6)]).splitlines()
+    assert len(lines) <= size[1]
+    assert max(map(len, lines)) <= size[0]
+    assert lines[1].startswith("running 9.0 s")
+    assert lines[1].endswith("lost") or "lost," in lines[1] or size[0] < 50
+    if raised:
+        assert lines[2].startswith("ALARM advisory: actuator")
+        # What is over now comes before what is held.
+        assert int(re.findall(r"actuator (\d+):", lines[2])[0]) % 2 == 1
+        told = sum(line.startswith("ALARM") for line in lines)
+        more = [int(found[1]) for line in lines if (found := re.match(r"and (\d+) more alarms", line))]
+        assert told + sum(more) == len(raised)
+        in_table = [line for line in lines if re.match(r"actuator \d+ .*12\.3", line)]
+        # Eight lines have no room for a table beside alarms.
+        assert in_table or size[1] == 8
+        assert not in_table or int(in_table[0].split()[1]) == raised[0] or len(in_table) == 64
+    assert "at 5.00 s" in lines[-1]
+
+
+def test_a_narrow_terminal_shows_numbers_without_intervals() -> None:
+    text = drawn(a_status(1), ("north",), (60, 24))
+    north = next(line for line in text.splitlines() if line.startswith("north"))
+    assert north.split() == ["north", "1.0200", "12.300", "2.5", "valid"]
+    assert "12.300 (12.100 to 12.500)" in drawn(a_status(1), ("north",), (110, 24))
+
+
+def test_the_view_tells_which_actuator_has_long_not_been_judged() -> None:
+    from rthstrack.live.view import Judged
+
+    judged = Judged(3, longest_s=6.0)
+    ambiguous = "not determined: ambiguous, delays of 1.5 and -98.5 ms fit equally well; lower max_delay_s below half"
+    assert judged.missing_s(a_status(3) | {"time_s": None}) == {}
+    for now_s in range(20):
+        status = a_status(3, time_s=float(now_s)) | {"time_s": float(now_s)}
+        status["readings"][1] |= {"valid": now_s < 3, "reason": None if now_s < 3 else ambiguous}
+        # One that rests has nothing to be judged by.
+        status["readings"][2] |= {"valid": False, "reason": "not determined: too little motion to judge by"}
+        missing = judged.missing_s(status)
+        assert missing == ({1: now_s - 2.0} if now_s > 8 else {})
+    lines = drawn(status, ("north", "south", "west"), unjudged_s=missing).splitlines()
+    said = "not judged for 17 s: one tone, 1.5 or -98.5 ms: choose with --expected-delay S"
+    assert said in next(line for line in lines if line.startswith("south"))
+    assert "not judged" not in next(line for line in lines if line.startswith("west"))
+    # Samples come, readings do not.
+    judged = Judged(1, longest_s=6.0)
+    for now_s in range(20):
+        missing = judged.missing_s({"time_s": float(now_s), "readings": [None]})
+    assert missing == {0: 19.0}
+
+
+ESCAPES = "\x1b]0;owned\x07\x1b[2J\x9b31m\r\n"
+
+
+def test_what_a_sender_or_a_layout_says_commands_no_terminal(
+    capsys: pytest.CaptureFixture[str], fake: type[FakeLive]
+) -> None:
+    fake.events = ({"time_s": 0.1, "text": f"the line '{ESCAPES}' is no sample"},)
+    _, _, err = run(capsys, *UDP)
+    assert err[-1] == "rthstrack: at 0.10 s: the line '\\x1b]0;owned\\x07\\x1b[2J\\x9b31m\\r\\n' is no sample"
+    status = a_status(1, valid=False, reason=ESCAPES)
+    status["health"]["log"] = ESCAPES
+    status["alarms"] = [an_alarm(0) | {"text": f"advisory: {ESCAPES}"}]
+    text = drawn(status, (ESCAPES,), events=[ESCAPES])
+    assert text.count("\\x1b]0;owned") >= 4
+    assert all(c.isprintable() or c == "\n" for c in text)
+
+
+def test_what_could_not_be_sent_or_written_is_in_the_view() -> None:
+    status = a_status(1)
+    assert "could not" not in drawn(status, ("north",))
+    status["health"] |= {"unsent": 3, "not_written": 4}
+    assert "3 datagrams could not be sent, 4 readings could not be written" in drawn(status, ("north",))
 
 
 def test_the_view_tells_what_is_not_valid_not_there_and_over_with_the_names_of_the_layout() -> None:
@@ -487,6 +803,18 @@ def test_a_page_whose_port_is_taken_is_a_line_and_status_1(
     assert len(err) == 1
     assert "--page: " in err[0]
     assert "in use" in err[0]
+
+
+def test_a_name_for_the_page_is_handed_to_it(
+    capsys: pytest.CaptureFixture[str], fake: type[FakeLive], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rthstrack.live import page
+
+    given: list[Any] = []
+    made = page.Page
+    monkeypatch.setattr(page, "Page", lambda *arguments: given.append(arguments[3]) or made(*arguments))
+    assert run(capsys, *UDP, "--page", 0, "--page-name", "lab.example", "--page-name", "rig")[0] == 0
+    assert given == [["lab.example", "rig"]]
 
 
 def test_a_page_is_served_at_the_address_that_is_told(capsys: pytest.CaptureFixture[str], fake: type[FakeLive]) -> None:
@@ -636,3 +964,20 @@ def test_lines_on_standard_input_are_read_to_their_end(header: str, tmp_path: Pa
     assert json.loads(done.stdout)["summary"]["received"] == 1024
     last = json.loads(readings.read_text().splitlines()[-1])
     assert last["delay_s"] == pytest.approx(DELAY_S, abs=1e-4)
+
+
+@compiled
+@pytest.mark.parametrize("form", ["csv", "json"])
+def test_lines_with_named_columns_and_no_counter_need_no_layout_file(form: str, tmp_path: Path) -> None:
+    t = np.arange(1024) / RATE_HZ
+    rows = list(zip(t, motion(t), GAIN * motion(t - DELAY_S), strict=True))
+    content = "time,x,y\n" + "".join(f"{a:.17g},{b:.17g},{c:.17g}\n" for a, b, c in rows)
+    if form == "json":
+        content = "".join(json.dumps({"time": a, "x": b, "y": c}) + "\n" for a, b, c in rows)
+    readings = tmp_path / "readings.jsonl"
+    command = [sys.executable, "-m", "rthstrack", "monitor", "--listen", "-", "--rate", "512", "--window", "1",
+               "--target", "x", "--measured", "y", "--no-counter", "--readings", str(readings)]  # fmt: skip
+    done = subprocess.run(command, input=content, capture_output=True, text=True, timeout=30, check=False)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["summary"]["received"] == 1024
+    assert json.loads(readings.read_text().splitlines()[-1])["delay_s"] == pytest.approx(DELAY_S, abs=1e-4)

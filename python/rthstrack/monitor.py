@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rthstrack import _core
-from rthstrack.errors import SignalError
+from rthstrack.errors import SettingError, SignalError
 from rthstrack.tracking import _band, _count, _ends, _number, _Result, _samples
 
 if TYPE_CHECKING:
@@ -197,8 +197,10 @@ class Monitor:
                         amplitude_interval, delay_interval_s, valid, tuple(reason), self.settings)  # fmt: skip
 
     def restart(self, index: int = 0) -> None:
-        """Forgets all samples; the next one has this index."""
-        self._stream.restart(index)
+        """Forgets all samples; the next one has this index, from 0 on. Raises SettingError."""
+        if isinstance(index, bool) or not isinstance(index, int | np.integer) or not 0 <= index < 1 << 63:
+            raise SettingError(f"index must be a whole number from 0 on, not {index!r}")
+        self._stream.restart(int(index))
 
     def __repr__(self) -> str:
         settings = ", ".join(f"{k}={v!r}" for k, v in dataclasses.asdict(self.settings).items())

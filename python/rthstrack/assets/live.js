@@ -13,6 +13,7 @@
   const DASHES = [undefined, [8, 3], [3, 3], [8, 3, 2, 3]];
   const WORDS = {
     delay: "Delay", amplitude: "Amplitude", critical_delay: "Critical delay", lost: "Lost samples", silence: "Silence",
+    unjudged: "Not judged",
   };
   const FULL = "Not connected: as many browsers as may are watching already; close one of them.";
   const LATCHED = "latched — advisory — reset at the terminal or by control datagram";
@@ -369,19 +370,26 @@
       movingChart("amplitude", "Amplitude A (-)", undefined, "", 1, 0, 0.05, amplitudeLimits),
       movingChart("delay", "Delay d (ms)", "Time (s)", "ms", 0, 1, 2, delayLimits),
     ];
-    const scopeAxis = { x: { label: "Time (s)", name: "t", unit: "s" }, y: { label: "Displacement", fixed: [-1, 1] } };
+    /* The label of an axis with the unit of the chosen actuator, where the layout names one. */
+    const inUnit = (words) => () => {
+      const unit = (hello.units || [])[state.focus];
+      return unit ? `${words} (${unit})` : words;
+    };
+    const scopeAxis = {
+      x: { label: "Time (s)", name: "t", unit: "s" }, y: { label: inUnit("Displacement"), fixed: [-1, 1] },
+    };
     const bothSignals = [{ label: "target", colour: "target" }, { label: "measured", colour: "measured" }];
     const scope = { ...scopeAxis, height, data: [[], [], []], series: bothSignals };
     scope.u = Charts.lines(host("scope"), scope).u;
     const loop = Charts.loop(host("loop"), {
-      x: { label: "Target" }, y: { label: "Measured" }, data: [[0], [0]], size: 330,
+      x: { label: inUnit("Target") }, y: { label: inUnit("Measured") }, data: [[0], [0]], size: 330,
     });
     const spectra = [true, false].map((log) => {
       const group = Charts.group({ extent: [0, hello.rate_hz / 2], home: hello.band_hz || [0, hello.rate_hz / 2] });
       const figure = host(log ? "spectrum-log" : "spectrum-linear");
       const options = {
         x: { label: "Frequency (Hz)", name: "f", unit: "Hz", group },
-        y: { label: "Amplitude", log, decades: 5, zero: !log },
+        y: { label: inUnit("Amplitude"), log, decades: 5, zero: !log },
         height: height + 30, data: [[], [], []], series: bothSignals,
       };
       return { u: Charts.lines(figure, options).u, group, log, free: true };
@@ -595,6 +603,8 @@
         if (active) worst = "alarm";
         else if (latched && !worst) worst = "latched";
       }
+      if (about("unjudged").some((x) => x.active)) worst = "alarm";
+      else if (about("unjudged").length && !worst) worst = "latched";
       const valid = Boolean(one && one.valid);
       host.classList.toggle("invalid", one != null && !valid);
       write(verdict, worst || (one == null ? "no reading yet" : valid ? "valid" : "not valid"));
@@ -645,6 +655,9 @@
       healthRow("readings", count(h.readings));
       healthRow("log", h.log ?? "none", h.log && h.log !== "writing" ? "bad" : "");
       healthRow("not logged", count(h.log_dropped), h.log_dropped ? "bad" : "");
+      for (const [name, words] of [["unsent", "not sent"], ["not_written", "not written"]]) {
+        if (h[name]) healthRow(words, count(h[name]), "bad");
+      }
     }
 
     function writeAll() {
@@ -673,15 +686,15 @@
       }
       shownAlarms = shown;
       const lines = trouble ? [element("li", trouble.kind, trouble.words)] : [];
-      for (const line of lines) line.setAttribute("aria-live", "off"); // the state is spoken, not every second of it
       const active = alarms.filter((alarm) => alarm.active).length;
       const howMany = `${active} alarms are active, ${alarms.length - active} latched.`;
       if (alarms.length > 6) lines.push(element("li", "count", howMany));
       const order = [...alarms].sort((a, b) => Number(b.active) - Number(a.active));
+      const called = ({ name, actuator }) =>
+        `${WORDS[name] ?? name}${actuator == null ? "" : ` · ${names[actuator] ?? actuator}`}`;
       for (const alarm of order) {
         const line = element("li", alarm.active ? "active" : "latched");
-        const who = alarm.actuator == null ? "" : ` · ${names[alarm.actuator] ?? alarm.actuator}`;
-        line.append(element("strong", "", `${WORDS[alarm.name] ?? alarm.name}${who}`));
+        line.append(element("strong", "", called(alarm)));
         line.append(element("span", "words", alarm.text));
         const since = alarm.since_s == null ? "" : `since t = ${seconds(alarm.since_s)}`;
         line.append(element("span", "note", alarm.active ? since : LATCHED));
@@ -691,6 +704,9 @@
       const calm = watched ? "No alarm." : "No alarm. No limit is set for amplitude or delay.";
       if (!lines.length) lines.push(element("li", "calm", calm));
       find(".alerts").replaceChildren(...lines);
+      // Which alarms there are is spoken; their numbers, which go on changing, are not.
+      const spoken = order.map((alarm) => `${alarm.active ? "Alarm" : "Latched"}: ${called(alarm)}.`);
+      write(find(".spoken"), alarms.length > 6 ? howMany : spoken.join(" "));
       for (const { name } of moving) {
         host(name).parentElement.classList.toggle("over", alarms.some((a) => a.active && a.name.endsWith(name)));
       }
@@ -702,8 +718,7 @@
       if (!(actuator >= 0 && actuator < n)) return;
       if (index !== row) {
         const last = history.last();
-        if (last != null && time < last) forget(); // the sender began anew
-        else if (last != null && time - last > 0.5 + 4 / hello.update_hz) leaveGap(last);
+        if (last != null && time - last > 0.5 + 4 / hello.update_hz) leaveGap(last);
         history.begin(time);
         row = index;
       }

@@ -6,6 +6,7 @@ import argparse
 import ipaddress
 import re
 import socket
+from typing import Any
 
 
 def udp(text: str) -> str:
@@ -30,9 +31,19 @@ def host(text: str) -> str:
     return _resolved(text)[0]
 
 
+def host_name(text: str) -> str:
+    """A name that stands for itself, as browsers write it, without a port."""
+    if not re.fullmatch(
+        r"[a-z0-9_]([a-z0-9_.-]{0,252}[a-z0-9_])?\.?|\[?[0-9a-f:]*:[0-9a-f:.]*\]?", text, re.ASCII | re.I
+    ):
+        raise argparse.ArgumentTypeError(f"expected the name of a machine, such as lab.example, found '{text}'")
+    return text
+
+
 def senders(text: str) -> list[str]:
     """All addresses, in numbers, that a name or address stands for."""
-    return _resolved(text)
+    # What comes in bears no interface that could be compared.
+    return [address.partition("%")[0] for address in _resolved(text)]
 
 
 def is_loopback(address: str) -> bool:
@@ -59,4 +70,10 @@ def _resolved(name: str) -> list[str]:
         raise argparse.ArgumentTypeError(f"expected an address or the name of a machine, found '{name}'") from None
     # IPv4 first, as what sends to a name such as localhost usually takes it.
     found.sort(key=lambda one: one[0] != socket.AF_INET)
-    return list(dict.fromkeys(str(one[4][0]) for one in found))
+    return list(dict.fromkeys(_with_scope(one[4]) for one in found))
+
+
+def _with_scope(address: tuple[Any, ...]) -> str:
+    """The address in numbers; a link-local one means nothing without its interface, fe80::1%2."""
+    scope = address[3] if len(address) > 3 else 0
+    return f"{address[0].partition('%')[0]}%{scope}" if scope else str(address[0])

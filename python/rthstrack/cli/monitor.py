@@ -14,9 +14,10 @@ from rthstrack.cli import addresses
 from rthstrack.cli.monitor_options import Plan, add_options, checked_plan
 from rthstrack.cli.running import Ended, say
 from rthstrack.errors import RthstrackError, SettingError
+from rthstrack.live import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from rthstrack._core import Live
     from rthstrack.live.log import Log
@@ -31,6 +32,7 @@ _IN_WORDS = {
     "not_written": "readings that the file could not take",
     "unsent": "datagrams that could not be sent",
 }
+_LIMITS = ("limit_delay", "limit_amplitude", "critical_delay", "limit_lost", "silence")
 # The status is looked at so often.
 _PERIOD_S = 0.1
 
@@ -70,7 +72,8 @@ def run(args: argparse.Namespace, wrong: Mapping[str, str]) -> int:
             live = _core.Live(plan.monitor, plan.source, plan.alarms, plan.outputs)
         except OSError as error:
             raise RthstrackError(_line(error)) from None
-        _monitored(args, plan, live, ended)
+        seen = _Seen(args)
+        _monitored(args, plan, live, ended, seen)
         summary = live.summary()
         print(json.dumps({"summary": {name: int(summary[name]) for name in _SUMMARY}}), flush=True)
         others = [f"{summary[name]} {words}" for name, words in _IN_WORDS.items() if summary.get(name)]
@@ -78,18 +81,74 @@ def run(args: argparse.Namespace, wrong: Mapping[str, str]) -> int:
             say(", ".join(others))
     fatal = live.fatal()
     if fatal is not None:
-        raise RthstrackError(fatal)
-    return ALARM if args.exit_on_alarm and live.alarmed() else 0
+        raise RthstrackError(printable(fatal))
+    nothing = _nothing_judged(plan, live, summary, seen.status)
+    if nothing is not None:
+        say(nothing)
+    return ALARM if args.exit_on_alarm and seen.alarm else 0
 
 
-def _monitored(args: argparse.Namespace, plan: Plan, live: Live, ended: Ended) -> None:
+class _Seen:
+    """What the statuses of a run have shown: the latest one, and whether there was an alarm that ends the run."""
+
+    def __init__(self, args: argparse.Namespace) -> None:
+        # A sender that is done falls silent; that is an alarm to end with only for those who asked for it.
+        self._silence_counts = bool(args.silence)
+        self.status: Mapping[str, Any] = {}
+        self.alarm = False
+
+    def take(self, status: Mapping[str, Any]) -> None:
+        self.status = status
+        # An alarm may have come and gone since the last status; its event has not.
+        self.alarm |= any(
+            alarm["active"] or alarm["latched"]
+            for alarm in status["alarms"]
+            if self._counts(alarm["name"] != "silence")
+        ) or any(
+            _is_raised(event["text"]) for event in status["events"] if self._counts(not _is_silence(event["text"]))
+        )
+
+    def _counts(self, is_other: bool) -> bool:
+        return is_other or self._silence_counts
+
+
+def _is_raised(text: str) -> bool:
+    """Whether an event's text says that an alarm was raised."""
+    return text.startswith("advisory") and not text.endswith(" is over")
+
+
+def _is_silence(text: str) -> bool:
+    return text.startswith("advisory: no sample for")
+
+
+def _nothing_judged(plan: Plan, live: Live, summary: Mapping[str, int], status: Mapping[str, Any]) -> str | None:
+    """Why a run said nothing of any actuator; None where it did. Without alarms it would look like a good test."""
+    received, readings = summary["received"], summary["readings"]
+    if not received:
+        what, where = ("line", "standard input") if plan.source["kind"] == "lines" else ("datagram", live.address())
+        if wrong := summary["malformed"]:
+            return f"no sample came: none of the {wrong} {what}s at {where} was as the layout says"
+        others = " but from senders that are not allowed" if summary.get("refused") else ""
+        return f"no sample came: no {what} at {where}{others}"
+    if not readings:
+        return (
+            f"nothing was judged: {received} samples came, but never a whole window of {plan.monitor['window_s']:g} s "
+            "without a gap that restarts it"
+        )
+    if summary.get("valid", readings):
+        return None
+    latest = [reading["reason"] for reading in status.get("readings", ()) if reading is not None and reading["reason"]]
+    return f"nothing was judged: none of {readings} readings was valid{f'; the last: {latest[-1]}' if latest else ''}"
+
+
+def _monitored(args: argparse.Namespace, plan: Plan, live: Live, ended: Ended, seen: _Seen) -> None:
     """The run from start to end, with log and page around it, all of them closed."""
     with contextlib.ExitStack() as cleanup:
         # Whatever fails on the way; once more below, for the order.
         cleanup.callback(live.stop)
         page = None
         if args.page is not None:
-            page = _page(live, args.page, args.page_host or "127.0.0.1")
+            page = _page(live, args.page, args.page_host or "127.0.0.1", args.page_name or ())
             cleanup.callback(page.stop)
         log = _log(args, plan, live)
         if log is not None:
@@ -105,7 +164,7 @@ def _monitored(args: argparse.Namespace, plan: Plan, live: Live, ended: Ended) -
         if not args.quiet:
             for line in (f"{about}; Ctrl-C ends", *_addresses(args, plan, live, page)):
                 say(line)
-        _watch(args, plan, live, ended, about)
+        _watch(args, plan, live, _statuses(args, live, ended, seen), ended, about)
 
 
 def _log(args: argparse.Namespace, plan: Plan, live: Live) -> Log | None:
@@ -129,27 +188,28 @@ def _log(args: argparse.Namespace, plan: Plan, live: Live) -> Log | None:
         ) from None
 
 
-def _page(live: Live, port: int, host: str) -> Any:
+def _page(live: Live, port: int, host: str, names: Sequence[str]) -> Any:
     from rthstrack.live.page import Page  # type: ignore[import-not-found, unused-ignore]
 
     try:
-        return Page(live, port, host)
+        return Page(live, port, host, names)
     except SettingError as error:
         # A port that is taken is no misuse.
         raise RthstrackError(f"--page: {error}") from None
 
 
-def _watch(args: argparse.Namespace, plan: Plan, live: Live, ended: Ended, about: str) -> None:
+def _watch(
+    args: argparse.Namespace, plan: Plan, live: Live, statuses: Iterator[dict[str, Any]], ended: Ended, about: str
+) -> None:
     """Shows what happens until the run ends, and ends it."""
     news = _News(plan.layout.names)
     stream = sys.stdout if sys.stdout.isatty() else sys.stderr
-    end = time.monotonic() + (args.duration or float("inf"))
     viewed: list[str] = []
-    if args.view or (stream is sys.stdout and not args.quiet):
+    if _is_viewed(args):
         from rthstrack.live.view import View
 
-        with View(stream, about, plan.layout.names) as view:
-            for status in _statuses(args, live, ended, end):
+        with View(stream, about, plan.layout.names, plan.monitor["window_s"]) as view:
+            for status in statuses:
                 fresh = list(news.of(status))
                 viewed += [text for text, is_alarm in fresh if is_alarm]
                 try:
@@ -164,21 +224,33 @@ def _watch(args: argparse.Namespace, plan: Plan, live: Live, ended: Ended, about
     # The view is gone, and with it what it said.
     for line in viewed:
         say(line)
-    for status in _statuses(args, live, ended, end):
+    for status in statuses:
         for text, is_alarm in news.of(status):
             if is_alarm or not args.quiet:
                 say(text)
 
 
-def _statuses(args: argparse.Namespace, live: Live, ended: Ended, end: float) -> Iterator[dict[str, Any]]:
+def _statuses(args: argparse.Namespace, live: Live, ended: Ended, seen: _Seen) -> Iterator[dict[str, Any]]:
     """How all stands, ten times a second until the run ends, and once more when it has been ended."""
+    end = time.monotonic() + (args.duration or float("inf"))
+
+    def status() -> dict[str, Any]:
+        found: dict[str, Any] = json.loads(live.status())
+        seen.take(found)
+        return found
+
     over = False
     while not over:
         over = live.wait(max(0.0, min(_PERIOD_S, end - time.monotonic()))) or time.monotonic() >= end
-        over |= ended.asked or (args.exit_on_alarm and live.alarmed())
-        yield json.loads(live.status())
+        found = status()
+        over |= ended.asked or (args.exit_on_alarm and seen.alarm)
+        yield found
     live.stop()
-    yield json.loads(live.status())
+    yield status()
+
+
+def _is_viewed(args: argparse.Namespace) -> bool:
+    return args.view or (sys.stdout.isatty() and not args.quiet)
 
 
 class _News:
@@ -199,7 +271,7 @@ class _News:
                 continue
             self._known[key] = None
             is_alarm = event["text"].startswith("advisory")
-            raised = is_alarm and not event["text"].endswith(" is over")
+            raised = _is_raised(event["text"])
             yield f"{'ALARM ' if raised else ''}{_at(event['time_s'])}{named(event['text'], self._names)}", is_alarm
         # A status has recent events only; so many are enough to know them by.
         while len(self._known) > 1024:
@@ -234,6 +306,9 @@ def _addresses(args: argparse.Namespace, plan: Plan, live: Live, page: Any) -> I
         yield f"a datagram 'reset' to udp://{live.control_address()} resets alarms"
     if args.log is not None:
         yield f"log: {args.log}"
+    limited = [option for option in _LIMITS if getattr(args, option)]
+    if limited and not (args.no_latch or args.exit_on_alarm or args.control is not None or _is_viewed(args)):
+        yield "an alarm stays until the end, for there is no way to reset it: --control [PORT], --view or --no-latch"
 
 
 def _line(error: OSError) -> str:

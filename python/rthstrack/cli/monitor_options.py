@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 from rthstrack.cli import addresses
 from rthstrack.cli.arguments import ESTIMATORS, count, not_negative, number, positive, power_of_two
 from rthstrack.errors import ConfigurationError, SettingError
-from rthstrack.live.layout import default_layout, read_layout
+from rthstrack.live import printable
+from rthstrack.live.layout import default_layout, layout_from, read_layout
 from rthstrack.monitor import largest_decimation
 
 if TYPE_CHECKING:
@@ -24,6 +25,8 @@ _WINDOWS = ("boxcar", "hann", "hamming", "blackman", "flattop", "tukey")
 _DETRENDS = ("none", "mean", "linear")
 _PAGE_PORT = 8765
 _HIGHEST_HZ = 32.0
+# Whether `_core.Live` takes the key `units` of outputs, which it hands to the page.
+_UNITS_TO_PAGE = False
 # Of one evaluated sample of one actuator: history, transforms and what the estimators keep of them.
 _STATE_BYTES = 256
 _MOST_STATE_BYTES = 1 << 30
@@ -90,6 +93,12 @@ def _add_input(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> None:
         "standard input")  # fmt: skip
     group.add_argument("--layout", metavar="FILE.toml", help="where counter, target and measured stand in a sample")
     add("--actuators", count, "N", "without --layout: how many actuators a sample has (1)")
+    add("--target", _column, "COLUMN", "lines, without --layout: target's name, or its column's number from 0 on; "
+        "repeat with --measured for every actuator", action="append")  # fmt: skip
+    add("--measured", _column, "COLUMN", "measured's name or number, one for each --target", action="append")
+    add("--counter", _column, "COLUMN", "with --target: the counter's name or number ('counter', or 0 beside numbers)")
+    group.add_argument("--no-counter", action="store_true", help="without --layout: samples bear no counter; losses "
+                       "are then not seen")  # fmt: skip
     add("--rate", positive, "HZ", "samples a second, of each actuator")
     add("--fill", _whole, "SAMPLES", "longest gap that is filled by a straight line; longer ones restart the window "
         "(5)")  # fmt: skip
@@ -125,7 +134,8 @@ def _add_alarms(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> None:
     add("--critical-delay", positive, "S", "delay at which the test becomes unstable ('rthstrack simulate' tells it)")
     add("--critical-fraction", positive, "X", "share of --critical-delay that the delay may reach (0.5)")
     add("--limit-lost", count, "N", "most samples lost within a window")
-    add("--silence", positive, "S", "longest time without a sample (1)")
+    add("--silence", not_negative, "S", "longest time without a sample (1; counts for --exit-on-alarm only where it is "
+        "given; 0: watch none)")  # fmt: skip
     add("--hysteresis", _share, "X", "an alarm is over when this share of its limit below it (0.1)")
     add("--alarm-after", not_negative, "S", "raise it only when the limit was exceeded for so long (0)")
     group.add_argument(
@@ -146,6 +156,8 @@ def _add_output(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> None:
     add("--page", addresses.port, "PORT", f"a live page for browsers ({_PAGE_PORT}; 0: a free port)", nargs="?",
         const=_PAGE_PORT)  # fmt: skip
     add("--page-host", addresses.host, "HOST", "address that the page is served at (127.0.0.1: this machine only)")
+    add("--page-name", addresses.host_name, "HOST", "a name by which browsers call this machine, besides localhost and "
+        "its addresses; may be repeated", action="append")  # fmt: skip
     add("--duration", positive, "S", "end after so long")
     how = group.add_mutually_exclusive_group()
     how.add_argument(
@@ -154,6 +166,13 @@ def _add_output(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> None:
     how.add_argument(
         "--view", action="store_true", help="the table, on standard error if standard output is no terminal"
     )
+
+
+def _column(text: str) -> str | int:
+    """A column by its name, or by its number from 0 on."""
+    if not text or text != printable(text):
+        raise argparse.ArgumentTypeError(f"expected a column's name or its number from 0 on, found '{printable(text)}'")
+    return int(text) if text.isascii() and text.isdigit() and len(text) <= 6 else text
 
 
 def _listen(text: str) -> str:
@@ -189,6 +208,7 @@ def checked_plan(args: argparse.Namespace, wrong: Mapping[str, str]) -> Plan:
         mistakes.append("--rate is missing: give the samples a second, --rate HZ")
     layout = _layout(args, mistakes)
     monitor = _monitor(args, layout.n_actuators, mistakes)
+    mistakes += _blind_limits(args, monitor)
     mistakes += _contradictions(args)
     readings = _outputs(args, mistakes)
     if mistakes:
@@ -210,7 +230,7 @@ def checked_plan(args: argparse.Namespace, wrong: Mapping[str, str]) -> Plan:
         "critical_delay_s": args.critical_delay,
         "critical_fraction": args.critical_fraction or 0.5,
         "limit_lost": args.limit_lost,
-        "silence_s": args.silence or 1.0,
+        "silence_s": 1.0 if args.silence is None else args.silence or None,
         "hysteresis": 0.1 if args.hysteresis is None else args.hysteresis,
         "minimum_duration_s": args.alarm_after or 0.0,
         "latch": not args.no_latch,
@@ -223,21 +243,55 @@ def checked_plan(args: argparse.Namespace, wrong: Mapping[str, str]) -> Plan:
         "page": args.page is not None,
         "names": list(layout.names),
     }
+    if _UNITS_TO_PAGE:
+        outputs["units"] = list(layout.units)
     return Plan(layout, monitor, source, alarms, outputs)
 
 
 def _layout(args: argparse.Namespace, mistakes: list[str]) -> Layout:
     """The layout; where it is wrong, that of one actuator, so that the rest can be checked."""
     source: Source = "lines" if args.listen == "-" else "udp"
-    if args.layout is not None and args.actuators is not None:
-        mistakes.append("--actuators speaks of the default layout, and --layout names another: give one of them")
+    named = args.target is not None or args.measured is not None
+    of_layout = [
+        option for option in ("actuators", "target", "measured", "counter") if getattr(args, option) is not None
+    ]
+    of_layout += ["no_counter"] if args.no_counter else []
+    if args.layout is not None and of_layout:
+        options = ", ".join(f"--{option.replace('_', '-')}" for option in of_layout)
+        speak = "speaks" if len(of_layout) == 1 else "speak"
+        mistakes.append(f"{options} {speak} of the default layout, and --layout names another: give one of them")
     try:
         if args.layout is not None:
             return read_layout(args.layout, source)
-        return default_layout(source, args.actuators or 1)
+        if named:
+            return _named_layout(args, mistakes)
+        if args.counter is not None:
+            mistakes.append("--counter speaks of columns: give --target and --measured too")
+        return default_layout(source, args.actuators or 1, counted=not args.no_counter)
     except ConfigurationError as error:
-        mistakes += [f"--actuators: {line}" if args.layout is None else line for line in str(error).splitlines()]
+        whose = "--target and --measured: " if named else "--actuators: "
+        mistakes += [line if args.layout is not None else f"{whose}{line}" for line in str(error).splitlines()]
         return default_layout(source)
+
+
+def _named_layout(args: argparse.Namespace, mistakes: list[str]) -> Layout:
+    """The layout of lines whose columns are named by options."""
+    target, measured = args.target or [], args.measured or []
+    n_mistakes = len(mistakes)
+    if args.listen != "-":
+        mistakes.append("--target and --measured name columns of lines: give --listen -, or --layout for datagrams")
+    if args.actuators is not None:
+        mistakes.append("--actuators speaks of the default layout, and --target names columns: give one of them")
+    if args.no_counter and args.counter is not None:
+        mistakes.append("--counter names what --no-counter says is not there: give one of them")
+    if len(target) != len(measured):
+        mistakes.append(f"--measured: expected one for each --target, found {len(measured)} for {len(target)}")
+    if len(mistakes) > n_mistakes or None in target or None in measured:
+        return default_layout("lines")
+    by_number = all(isinstance(column, int) for column in (*target, *measured))
+    counter = False if args.no_counter else (0 if by_number else "counter") if args.counter is None else args.counter
+    pairs = [{"target": t, "measured": m} for t, m in zip(target, measured, strict=True)]
+    return layout_from({"counter": counter, "actuator": pairs}, "lines")
 
 
 def _monitor(args: argparse.Namespace, n_actuators: int, mistakes: list[str]) -> dict[str, Any]:
@@ -295,6 +349,31 @@ def _band_mistakes(rate: float, band: tuple[float, ...], p: int | None) -> Itera
         yield f"--band: expected HI of at most {of_rate}, {highest:g} Hz, found {high:g}"
 
 
+def _blind_limits(args: argparse.Namespace, monitor: Mapping[str, Any]) -> Iterator[str]:
+    """Limits that no reading could ever exceed: a delay that is not looked for makes none, so nothing would be said."""
+    if monitor["estimator"] == "fei":
+        return
+    # A window is compared over the half of it that is left at the largest shift to either side.
+    most, of_which, larger = min(
+        (monitor["max_delay_s"], "--max-delay", "--max-delay"),
+        (monitor["window_s"] / 4, "a quarter of --window", "--window"),
+    )
+    fraction = args.critical_fraction or 0.5
+    critical = None if args.critical_delay is None else fraction * args.critical_delay
+    limits = [
+        ("--limit-delay", args.limit_delay, "", args.limit_delay),
+        ("--critical-delay", critical, f", {fraction:g} of it,", args.critical_delay),
+    ]
+    for option, limit, share, given in limits:
+        if limit is None or limit < most:
+            continue
+        milli = f"; in seconds, {given:g} ms is {given / 1000:g}" if limit / 1000 < most else ""
+        yield (
+            f"{option}: {limit:g} s{share} can never be exceeded, for {monitor['estimator']} looks for delays of up to "
+            f"{of_which}, {most:g} s: expected less, or a larger {larger}{milli}"
+        )
+
+
 def _most_bytes() -> float:
     """What the windows may take: half of the memory that is free, and no more than 1 GiB."""
     try:
@@ -308,8 +387,9 @@ def _contradictions(args: argparse.Namespace) -> Iterator[str]:
     """Options that speak of another one that is not there."""
     if args.critical_fraction is not None and args.critical_delay is None:
         yield "--critical-fraction speaks of --critical-delay: give it too"
-    if args.page_host is not None and args.page is None:
-        yield "--page-host speaks of --page: give it too"
+    for option in ("page_host", "page_name"):
+        if getattr(args, option) is not None and args.page is None:
+            yield f"--{option.replace('_', '-')} speaks of --page: give it too"
     if args.listen == "-":
         for option in ("allow", "any_pace"):
             if getattr(args, option):
@@ -350,6 +430,9 @@ def _not_writable(path: Path, *, may_hold_something: bool) -> Iterator[str]:
     try:
         if path.is_dir():
             yield "is a directory; expected the name of a file"
+        elif path.exists() and not path.is_file():
+            # Opening a pipe waits for whoever reads it; the test would not be watched meanwhile.
+            yield "is a pipe or a device; expected the name of a file, new or to be added to"
         elif path.is_file() and path.stat().st_size and not may_hold_something:
             yield "is there already and holds something: nothing is overwritten; choose another name"
         elif not path.parent.is_dir():

@@ -180,7 +180,8 @@ def _send(signals: _Signals, layout: DatagramLayout, args: argparse.Namespace, e
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family, socket.SOCK_DGRAM) as sock:
         try:
-            sock.connect((host.strip("[]"), int(port)))
+            # A link-local address bears its interface, which connecting to a text would forget.
+            sock.connect(socket.getaddrinfo(host.strip("[]"), int(port), family, socket.SOCK_DGRAM)[0][4])
         except OSError as error:
             raise RthstrackError(f"--to: nothing can be sent to udp://{args.to}: {error.strerror}") from None
         n, begin_s = len(signals.target), time.monotonic()

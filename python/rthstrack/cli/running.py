@@ -7,6 +7,8 @@ import signal
 import sys
 from typing import Any
 
+from rthstrack.live import printable
+
 
 class Ended:
     """Whether SIGINT, SIGTERM or the loss of the terminal has asked for the end; within `with`."""
@@ -35,6 +37,6 @@ class Ended:
 
 
 def say(line: str) -> None:
-    """A line on standard error. Whoever read it may be gone; the test is not."""
+    """A line on standard error, whatever a sender has put into it. Whoever read it may be gone; the test is not."""
     with contextlib.suppress(OSError, ValueError):
-        print(f"rthstrack: {line}", file=sys.stderr, flush=True)
+        print(f"rthstrack: {printable(line)}", file=sys.stderr, flush=True)

@@ -12,6 +12,7 @@ import numpy as np
 
 from rthstrack.errors import ConfigurationError, SettingError
 from rthstrack.keyed_table import NUMBER, Kind, Table, one_of, read_toml, shown, suggestion, whole
+from rthstrack.live import printable
 
 if TYPE_CHECKING:
     import os
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 Source = Literal["udp", "lines"]
 
+
 _TYPES = {"f32": "f4", "f64": "f8", "i16": "i2", "u16": "u2", "i32": "i4", "u32": "u4", "i64": "i8", "u64": "u8"}
 # What one UDP datagram can hold over IPv4.
 _MOST_BYTES = 65507
@@ -28,12 +30,15 @@ _MOST_ACTUATORS = 256
 _OF_DATAGRAMS = ("byte_order", "header_bytes", "sample_bytes", "type")
 _OF_LINES = ("format", "delimiter")
 _WHOLE = Kind("a whole number from 0 on", whole)
-_TEXT = Kind("a text", lambda value: value if isinstance(value, str) and value.strip() else None)
+_TEXT = Kind(
+    "a text without control characters",
+    lambda value: value if isinstance(value, str) and value.strip() and value == printable(value) else None,
+)
 _TYPE = one_of(*_TYPES)
 _FACTOR = Kind("a finite number other than zero", lambda value: NUMBER.read(value) or None)
 _COLUMN = Kind(
     "a column's name, or its number from 0 on",
-    lambda value: value if isinstance(value, str) and value else whole(value),
+    lambda value: value if isinstance(value, str) and value and value == printable(value) else whole(value),
 )
 _FIELDS = Kind(
     "a list of 'counter', 'target_1', 'measured_1', 'target_2', ... and 'skip', in the order they are sent",
@@ -184,9 +189,11 @@ class LineLayout(_Layout[Column]):
 Layout = DatagramLayout | LineLayout
 
 
-def default_layout(source: Source, n_actuators: int = 1) -> Layout:
+def default_layout(source: Source, n_actuators: int = 1, *, counted: bool = True) -> Layout:
     """What a UDP-send block of Simulink or LabVIEW sends: little-endian doubles counter, target_1, measured_1, ..."""
-    names = ["counter"] + [f"{role}_{i}" for i in range(1, n_actuators + 1) for role in ("target", "measured")]
+    names = ["counter"] * counted + [
+        f"{role}_{i}" for i in range(1, n_actuators + 1) for role in ("target", "measured")
+    ]
     return layout_from({"fields": names}, source)
 
 

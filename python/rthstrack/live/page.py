@@ -11,6 +11,7 @@ import contextlib
 import errno
 import hashlib
 import os
+import re
 import secrets
 import socket
 import sys
@@ -42,6 +43,7 @@ RETRY_MS = 500
 _PIECE = 1 << 16
 _STYLES = ("uPlot.min.css", "charts.css", "live.css")
 _SCRIPTS = ("uPlot.iife.min.js", "charts.js", "live.js")
+_HOST = re.compile(r"(\[[0-9a-f:.]+\]|[^\[\]:/@\s]+)(?::\d{1,5})?", re.ASCII)
 _LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
 
@@ -59,7 +61,8 @@ class Page:
     """Serves the live page of `source` at `url`, between `start` and `stop`; the port is taken when constructing.
 
     port: 0 takes a free one. host: the address to listen at; only this machine can reach the default. allowed_hosts:
-    names by which browsers may call this machine, besides localhost and its addresses.
+    names by which browsers may call this machine, besides localhost and its addresses, whatever the port: it may be
+    another one at the near end of a tunnel (`ssh -L`).
     Errors: SettingError where nothing can listen at that address and port.
     """
 
@@ -104,7 +107,7 @@ def _listening(source: Source, host: str, port: int, allowed_hosts: Iterable[str
             f"the page cannot listen at {host!r}: not an address of this machine ({error}); take 127.0.0.1"
         ) from error
     try:
-        return _Server(source, family, address[:2], allowed_hosts)
+        return _Server(source, family, address, allowed_hosts)
     except OSError as error:
         where = _authority(host, port)
         raise SettingError(f"the page cannot listen at {where}: {_what_to_do(error)}") from error
@@ -141,12 +144,13 @@ class _Server(ThreadingHTTPServer):
         self._lock = threading.Lock()
         self._open: set[socket.socket] = set()
         self._n_browsers = 0
-        super().__init__((str(address[0]), int(address[1])), _Handler)
+        # Of IPv6 whole, for its last number is the interface of a link-local address.
+        super().__init__(address, _Handler)  # type: ignore[arg-type, unused-ignore]
         bound = ip_address(self.server_name.partition("%")[0])
         any_address = {4: "127.0.0.1", 6: "::1"}
         self.shown_host = any_address[bound.version] if bound.is_unspecified else self.server_name
         names = {*_LOOPBACK, self.shown_host, *allowed_hosts}
-        self.allowed = {_authority(name.lower().strip("[]"), self.server_port) for name in names}
+        self.allowed = {name.lower().strip("[]") for name in names}
 
     def server_bind(self) -> None:
         """Bind without HTTPServer's search for this machine's name, which can take seconds."""
@@ -236,13 +240,14 @@ class _Handler(BaseHTTPRequestHandler):
         return None
 
     def _is_ours(self, host: str) -> bool:
-        """Whether `host` is a name of ours: a page elsewhere can let its own name lead to this address (rebinding)."""
-        port = self.server.server_port
-        called = host.strip().lower()
-        if port == 80 and called.rpartition("]")[2].find(":") < 0:
-            called = f"{called}:80"
+        """Whether `host` is a name of ours: a page elsewhere can let its own name lead to this address (rebinding).
+
+        Any port will do, for a name that is ours leads to this machine, and what another of its ports serves is told by
+        its Origin.
+        """
+        found = _HOST.fullmatch(host.strip().lower())
         reached = self.connection.getsockname()[0].partition("%")[0]
-        return called in self.server.allowed or called == _authority(reached, port)
+        return found is not None and found[1].strip("[]") in {*self.server.allowed, reached}
 
     # ------------------------------------------------------------------------------------------------ the stream
 

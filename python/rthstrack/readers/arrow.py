@@ -24,8 +24,8 @@ END_OF_STREAM = CONTINUATION + bytes(4)
 
 #: Metadata of the monitor's log of samples: key and value.
 SAMPLE_LOG = (b"content", b"rthstrack samples")
-# A gap in a log's index that would make it this many times as long is damage.
-_MOST_STRETCH = 64
+# A log whose gaps are filled with NaN may take so much memory. A sender that paused for an hour is no damage.
+_MOST_BYTES = 1 << 30
 
 
 def read(path: Path) -> Contents:
@@ -103,6 +103,7 @@ def _stream(content: bytes) -> tuple[Any, list[Any], bool]:
 def _gaps_shown(series: list[Series], notes: list[str]) -> list[Series]:
     """A log's samples on an even grid: NaN where a gap was too long to be filled and the monitor wrote nothing."""
     named = {one.name: one.values for one in series}
+    _note_restarts(named.get("counter"), notes)
     index, time_s = named.get("index"), named.get("time_s")
     if index is None or time_s is None or len(index) < 2:
         return series
@@ -110,8 +111,12 @@ def _gaps_shown(series: list[Series], notes: list[str]) -> list[Series]:
     if not (np.isfinite(index).all() and (steps >= 1).all()) or (steps == 1).all():
         return series
     n = int(index[-1] - index[0]) + 1
-    if n > _MOST_STRETCH * len(index):
-        raise RecordingError(f"damaged: its index goes from {index[0]:.0f} to {index[-1]:.0f} in {len(index)} samples")
+    if n * len(series) * 8 > _MOST_BYTES:
+        raise RecordingError(
+            f"its index goes from {index[0]:.0f} to {index[-1]:.0f} in {len(index)} samples: with its gaps it would "
+            f"take {n * len(series) * 8 / 2**30:.3g} GiB, expected at most {_MOST_BYTES / 2**30:g}; it is damaged, or "
+            "was written over so long a pause that its parts have to be cut out with pyarrow"
+        )
     places = (index - index[0]).astype(np.int64)
     gaps = int(np.count_nonzero(steps > 1))
     notes.append(f"{n - len(index)} samples in {gaps} gap(s) are not in the log and are NaN here")
@@ -125,6 +130,19 @@ def _gaps_shown(series: list[Series], notes: list[str]) -> list[Series]:
         return out
 
     return [Series(one.name, one.path, one.unit, spread(one.name, one.values)) for one in series]
+
+
+def _note_restarts(counter: NDArray[np.float64] | None, notes: list[str]) -> None:
+    """Where the sender's counter falls another run began: two tests are in one log."""
+    if counter is None:
+        return
+    falls = np.flatnonzero(np.diff(counter) < 0) + 1
+    if falls.size:
+        rows = ", ".join(map(str, falls[:4])) + (", ..." if falls.size > 4 else "")
+        notes.append(
+            f"its counter falls {falls.size} time(s), at row {rows} from 0: the sender began anew or its counter "
+            "wrapped, so parts before and after may be different tests"
+        )
 
 
 def _is_number(kind: Any) -> bool:
