@@ -26,7 +26,7 @@ ALARMS = {
     "limit_delay_s", "limit_amplitude", "critical_delay_s", "critical_fraction", "limit_lost", "silence_s",
     "hysteresis", "minimum_duration_s", "latch",
 }  # fmt: skip
-OUTPUTS = {"readings_udp", "readings_file", "alarm_udp", "control", "log", "page", "names"}
+OUTPUTS = {"readings_udp", "readings_file", "alarm_udp", "control", "log", "page", "names", "units"}
 
 
 class FakeLive:
@@ -51,7 +51,7 @@ class FakeLive:
             raise self.refusal
         # As the contract has it, no more and no less.
         assert (set(monitor), set(source), set(alarms)) == (MONITOR, SOURCE, ALARMS)
-        assert set(outputs) - {"units"} == OUTPUTS
+        assert set(outputs) == OUTPUTS
         type(self).made = self
         self.monitor, self.source, self.alarms, self.outputs = monitor, source, alarms, outputs
         self.rate_hz, self.n_actuators = monitor["rate_hz"], monitor["n_actuators"]

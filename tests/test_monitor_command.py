@@ -246,6 +246,7 @@ def test_defaults_are_those_that_the_help_states(capsys: pytest.CaptureFixture[s
     assert made.outputs == {
         "readings_udp": None, "readings_file": None, "alarm_udp": None, "control": None, "log": False, "page": False,
         "names": ["actuator 0", "actuator 1"],
+        "units": [None, None],
     }  # fmt: skip
 
 
@@ -280,6 +281,7 @@ def test_every_option_reaches_the_compiled_part(
     assert made.outputs == {
         "readings_udp": "127.0.0.1:7003", "readings_file": str(tmp_path / "r.jsonl"), "alarm_udp": "127.0.0.1:7001",
         "control": "127.0.0.1:7002", "log": True, "page": False, "names": ["actuator 0"],
+        "units": [None],
     }  # fmt: skip
 
 
@@ -397,16 +399,11 @@ def test_alarms_that_nobody_can_reset_are_told_at_the_start(
     assert any("an alarm stays until the end, for there is no way to reset it" in line for line in err) is is_told
 
 
-@pytest.mark.parametrize("are_taken", [True, False])
-def test_units_reach_the_page_where_the_compiled_part_takes_them(
-    capsys: pytest.CaptureFixture[str], fake: type[FakeLive], monkeypatch: pytest.MonkeyPatch, tmp_path: Path,
-    are_taken: bool,
-) -> None:  # fmt: skip
+def test_units_reach_the_page(capsys: pytest.CaptureFixture[str], fake: type[FakeLive], tmp_path: Path) -> None:
     path = tmp_path / "layout.toml"
     path.write_text('fields = ["counter", "target", "measured"]\nunit = "mm"\n')
-    monkeypatch.setattr("rthstrack.cli.monitor_options._UNITS_TO_PAGE", are_taken)
     assert run(capsys, *UDP, "--layout", path)[0] == 0
-    assert fake.made.outputs.get("units") == (["mm"] if are_taken else None)
+    assert fake.made.outputs["units"] == ["mm"]
 
 
 def test_an_address_that_others_reach_is_told_unless_senders_are_listed(

@@ -11,12 +11,12 @@ use crate::outlets::Item;
 /// Readings kept of each actuator, all of the latest and some of those before.
 const MAX_READINGS: usize = 2048;
 /// And of all together.
-const MAX_READINGS_OF_ALL: usize = 65_536;
+const MAX_READINGS_OF_ALL: usize = 16_384;
 /// How far back the page looks.
 const HISTORY_S: f64 = 1800.0;
 /// Of the scope.
 const SCOPE_S: f64 = 10.0;
-const MAX_EVENTS: usize = 200;
+const MAX_EVENTS: usize = 256;
 
 /// A time of the stream and what happened.
 #[derive(Debug, Clone, PartialEq)]

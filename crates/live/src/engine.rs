@@ -183,6 +183,11 @@ impl Engine {
         self.fatal.as_deref()
     }
 
+    /// So many samples come at once: a datagram's.
+    pub fn comes_in_blocks(&mut self, n_samples: usize) {
+        self.sequence.comes_in_blocks(n_samples);
+    }
+
     /// Something that was no sample came.
     pub fn malformed(&mut self) {
         self.totals.malformed += 1;
@@ -222,7 +227,8 @@ impl Engine {
                 self.sequence.place_within(counter, paused, (PLAUSIBLE * (elapsed_s + 1.0) * rate_hz) as i64)
             }
             Some(counter) => self.sequence.place(counter, paused),
-            None if elapsed_s > self.silence_s => self.sequence.uncounted_anew(),
+            // A second more, for what a slow reader of the log may hold up a file.
+            None if elapsed_s > self.silence_s + 1.0 => self.sequence.uncounted_anew(),
             None => self.sequence.uncounted(),
         };
         if place == Place::Dropped {

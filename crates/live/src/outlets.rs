@@ -34,8 +34,8 @@ const BOARD_S: f64 = 10.0;
 /// Of items that come irregularly.
 const SPARE: usize = 1024;
 
-/// Longest queue of words, half a gibibyte, and of readings.
-const MAX_WORDS: usize = 1 << 26;
+/// Longest queue of words, 64 MiB, and of readings.
+const MAX_WORDS: usize = 1 << 23;
 const MAX_READINGS: usize = 1 << 20;
 
 /// Words before the numbers in a row of the log: index, counter, filled.

@@ -115,7 +115,7 @@ impl Receiver {
                         if let Some(other) = senders.other(now_s, from) {
                             let text = format!(
                                 "datagrams come from {from} and from {other}: two senders make no sense of the counter; \
-                                 end one of them, or accept only one machine"
+                                 end one of them (--allow takes one machine only)"
                             );
                             engine.tell(now_s, text, &mut out);
                         }
@@ -169,6 +169,7 @@ impl Receiver {
             }
             return;
         };
+        engine.comes_in_blocks(n);
         for i in 0..n {
             match self.layout.decode(datagram, i, target, measured) {
                 Some(counter) => {

@@ -25,8 +25,6 @@ _WINDOWS = ("boxcar", "hann", "hamming", "blackman", "flattop", "tukey")
 _DETRENDS = ("none", "mean", "linear")
 _PAGE_PORT = 8765
 _HIGHEST_HZ = 32.0
-# Whether `_core.Live` takes the key `units` of outputs, which it hands to the page.
-_UNITS_TO_PAGE = False
 # Of one evaluated sample of one actuator: history, transforms and what the estimators keep of them.
 _STATE_BYTES = 256
 _MOST_STATE_BYTES = 1 << 30
@@ -242,9 +240,8 @@ def checked_plan(args: argparse.Namespace, wrong: Mapping[str, str]) -> Plan:
         "log": args.log is not None,
         "page": args.page is not None,
         "names": list(layout.names),
+        "units": list(layout.units),
     }
-    if _UNITS_TO_PAGE:
-        outputs["units"] = list(layout.units)
     return Plan(layout, monitor, source, alarms, outputs)
 
 
