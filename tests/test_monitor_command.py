@@ -905,7 +905,7 @@ def test_a_delay_beyond_its_limit_ends_it_with_status_3(recorded: Path) -> None:
     status, summary, err = monitored.end(None)
     assert status == 3
     assert summary["alarms"] == 1
-    assert re.search(r"ALARM at [\d.]+ s: advisory: actuator 0: delay of 1[12]\.\d+ ms, limit 10\.000 ms", err)
+    assert re.search(r"ALARM at [\d.]+ s: advisory: actuator 0: lag of up to 1[12]\.\d+ ms, limit 10\.000 ms", err)
 
 
 @compiled
