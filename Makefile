@@ -123,6 +123,10 @@ accuracy: .venv/built ## gain and delay beside the truth, and their intervals; w
 online: .venv/built ## how soon a reading follows a step and a ramp in delay; writes docs/online-response.md and its figure
 	@$(BIN)/python benchmarks/online_response.py
 
+.PHONY: load
+load: .venv/built ## eight actuators at 4096 Hz for ten minutes, garbage beside them in the second half: what is lost, what it takes
+	@$(BIN)/python benchmarks/online_load.py
+
 .PHONY: soak
 soak: .venv/ready toolchain ## 10^8 samples through the monitor: the last reading has the bits of an early one
 	@mkdir -p $(OUT)

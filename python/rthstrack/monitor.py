@@ -94,7 +94,8 @@ class Monitor:
     rate_hz: samples a second. window_s: length of the window. update_hz: readings a second (rounded to a whole number
     of decimated samples). band_hz, window, detrend, estimator, frequency_decimation, max_delay_s: as in `evaluate`.
     data_decimation: P, a power of two: samples are low-passed and decimated as they come, which keeps up to
-    rate / (4 P); None chooses the largest for the band. expected_delay_s: of delays that fit equally well (the target
+    rate / (4 P); None chooses the largest for the band. With P above 1 "least_squares" leaves a band from 0 to
+    just that to the low-pass, as if `band_hz` were None. expected_delay_s: of delays that fit equally well (the target
     is one tone) the one nearest to this is taken. minimum_amplitude: windows in which the target's amplitude (sqrt(2)
     times its standard deviation) is less are not judged. n_actuators: channels that are stepped together.
 

@@ -1,7 +1,7 @@
 //! The threads behind the receiving one: one keeps the board, one writes the file of readings.
 
 use std::fs::{File, OpenOptions};
-use std::io::{BufWriter, Write};
+use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
 use std::thread;
@@ -18,6 +18,8 @@ use crate::shared::{Shared, locked};
 const PERIOD: Duration = Duration::from_millis(20);
 /// What a reader of the file waits at most.
 const FLUSH: Duration = Duration::from_millis(100);
+/// Bytes.
+const MOST_AT_ONCE: usize = 1 << 16;
 
 /// Keeps the board until the stream has ended and all is taken.
 pub(crate) fn keep_board(shared: &Shared, page: &Page, mut items: Consumer<Item>, mut rows: Option<Consumer<f64>>) {
@@ -38,16 +40,20 @@ pub(crate) fn open_readings(path: &Path) -> std::io::Result<File> {
 }
 
 /// Writes readings as lines until the stream has ended. When the disk is full it says so, and the monitor goes on.
-pub(crate) fn write_readings(shared: &Arc<Shared>, file: File, path: &Path, mut readings: Consumer<Reading>) {
-    let mut file = BufWriter::with_capacity(1 << 16, file);
-    let mut line = String::with_capacity(1024);
+pub(crate) fn write_readings(shared: &Arc<Shared>, mut file: File, path: &Path, mut readings: Consumer<Reading>) {
+    let mut lines = String::with_capacity(1 << 16);
+    let mut length = file.metadata().map_or(0, |m| m.len());
     loop {
         let ended = readings.is_abandoned();
-        if let Err(error) = write_all(&mut file, &mut line, &mut readings) {
-            shared.remark(format!("readings are no longer written to {}: {error}", path.display()));
-            // What is in the buffer cannot be written either.
-            let _ = file.into_parts();
-            return;
+        while !readings.is_empty() {
+            take_lines(&mut lines, &mut readings);
+            if let Err(error) = file.write_all(lines.as_bytes()) {
+                // No part of a line stays behind; a device has no length to go back to.
+                let _ = file.set_len(length);
+                shared.remark(format!("readings are no longer written to {}: {error}", path.display()));
+                return;
+            }
+            length += lines.len() as u64;
         }
         if ended {
             return;
@@ -56,12 +62,13 @@ pub(crate) fn write_readings(shared: &Arc<Shared>, file: File, path: &Path, mut 
     }
 }
 
-fn write_all(file: &mut impl Write, line: &mut String, readings: &mut Consumer<Reading>) -> std::io::Result<()> {
-    while let Ok(reading) = readings.pop() {
-        line.clear();
-        json::reading(line, &reading);
-        line.push('\n');
-        file.write_all(line.as_bytes())?;
+/// As many as are written at once.
+fn take_lines(lines: &mut String, readings: &mut Consumer<Reading>) {
+    lines.clear();
+    while lines.len() < MOST_AT_ONCE
+        && let Ok(reading) = readings.pop()
+    {
+        json::reading(lines, &reading);
+        lines.push('\n');
     }
-    file.flush()
 }

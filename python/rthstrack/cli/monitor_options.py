@@ -414,10 +414,14 @@ def _outputs(args: argparse.Namespace, mistakes: list[str]) -> dict[str, Any]:
         files["--log"] = args.log
         if args.log.name:
             files["--log, its readings"] = readings_path(args.log)
+    told: set[str] = set()
     for option, path in files.items():
         # Lines are written behind what a file holds; a log begins with its schema.
-        problems = _not_writable(path, may_hold_something=option == "--readings")
-        mistakes += [f"{option}: {path}: {message}" for message in problems]
+        for problem in _not_writable(path, may_hold_something=option == "--readings"):
+            # What is wrong with a folder is wrong for both files of a log.
+            if not (option == "--log, its readings" and problem in told):
+                mistakes.append(f"{option}: {path}: {problem}")
+            told.add(problem)
     logs = [option for option, path in files.items() if path == files.get("--readings") and option != "--readings"]
     mistakes += [f"--readings and {option} name the same file, {files[option]}" for option in logs]
     return found
