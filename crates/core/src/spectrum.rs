@@ -492,10 +492,10 @@ impl Unpack {
             let zero = ([0.0; LANES], [0.0; LANES]);
             let (m_low, m_high) = if BOTH { unpack_group(measured, half, k, &twiddle) } else { (zero, zero) };
             if lower_needed {
-                hand_over(first, last, k, t_low, m_low, sink);
+                hand_over(first, last, &group(k, t_low, m_low), sink);
             }
             if upper_needed {
-                hand_over(first, last, upper, t_high, m_high, sink);
+                hand_over(first, last, &group(upper, t_high, m_high), sink);
             }
         }
         // What the groups leave: the middle bins and the Nyquist bin (k = H).
@@ -510,27 +510,33 @@ impl Unpack {
 
 type Lanes = ([f64; LANES], [f64; LANES]);
 
-/// Gives the bins from `base` on to `sink`, those that are kept.
+/// Bins of both signals from `first` on.
 #[inline(always)]
-fn hand_over<S: Sink>(
-    first: usize,
-    last: usize,
-    base: usize,
-    (target_re, target_im): Lanes,
-    (measured_re, measured_im): Lanes,
-    sink: &mut S,
-) {
-    if first <= base && base + LANES - 1 <= last {
-        sink.take(&Bins::<LANES> { first: base, target_re, target_im, measured_re, measured_im });
-        return;
+fn group(first: usize, (target_re, target_im): Lanes, (measured_re, measured_im): Lanes) -> Bins<LANES> {
+    Bins { first, target_re, target_im, measured_re, measured_im }
+}
+
+/// Gives the bins to `sink`, those that are kept.
+#[inline(always)]
+fn hand_over<S: Sink>(first: usize, last: usize, bins: &Bins<LANES>, sink: &mut S) {
+    if first <= bins.first && bins.first + LANES - 1 <= last {
+        sink.take(bins);
+    } else {
+        hand_over_some(first, last, bins, sink);
     }
-    for i in (0..LANES).filter(|i| (first..=last).contains(&(base + i))) {
+}
+
+/// The same at an end of what is kept. Apart, so that the loop over the others stays short.
+#[cold]
+#[inline(never)]
+fn hand_over_some<S: Sink>(first: usize, last: usize, bins: &Bins<LANES>, sink: &mut S) {
+    for i in (0..LANES).filter(|i| (first..=last).contains(&(bins.first + i))) {
         sink.take(&Bins::<1> {
-            first: base + i,
-            target_re: [target_re[i]],
-            target_im: [target_im[i]],
-            measured_re: [measured_re[i]],
-            measured_im: [measured_im[i]],
+            first: bins.first + i,
+            target_re: [bins.target_re[i]],
+            target_im: [bins.target_im[i]],
+            measured_re: [bins.measured_re[i]],
+            measured_im: [bins.measured_im[i]],
         });
     }
 }
