@@ -336,8 +336,7 @@ def main() -> int:
         " public function against the compiled plan.",
         "",
         "`aligned` transforms target, its slope, measured and residual and cannot be had for 2.5 plain evaluations,"
-        " which are two transforms. In 4 s windows with a Hann window `least_squares` took 2.4 to 2.65 times the plain"
-        " time from run to run.",
+        " which are two transforms.",
         "",
         "Between runs the cells at P = 64, Q >= 16 move from 0.9 to 1.14 times their neighbours, so that one of them"
         " is now and then over 1.1. P = 16 over P = 1 is for vectors of 512 bits; with 256 bits it was 0.39 to 0.42 at"
