@@ -49,7 +49,7 @@ class FakeLive:
     def __init__(self, monitor: Any, source: Any, alarms: Any, outputs: Any) -> None:
         if self.refusal is not None:
             raise self.refusal
-        # As the contract has it, no more and no less.
+        # The keys that the compiled part takes, no more and no less.
         assert (set(monitor), set(source), set(alarms)) == (MONITOR, SOURCE, ALARMS)
         assert set(outputs) == OUTPUTS
         type(self).made = self

@@ -204,8 +204,12 @@ impl Alarm {
 
     /// What it says, as advice.
     pub fn text(&self) -> String {
+        self.advice(&self.kind.words(self.value, self.limit))
+    }
+
+    fn advice(&self, text: &str) -> String {
         let whose = self.actuator.map_or_else(String::new, |a| format!("actuator {a}: "));
-        format!("advisory: {whose}{}", self.kind.words(self.value, self.limit))
+        format!("advisory: {whose}{text}")
     }
 
     /// Compares; tells whether it was raised or ended by this.
@@ -286,8 +290,7 @@ impl Change {
         if self.raised {
             return self.alarm.text();
         }
-        let whose = self.alarm.actuator.map_or_else(String::new, |a| format!("actuator {a}: "));
-        format!("advisory: {whose}alarm '{}' is over", self.alarm.kind.name())
+        self.alarm.advice(&format!("alarm '{}' is over", self.alarm.kind.name()))
     }
 }
 

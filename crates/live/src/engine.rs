@@ -286,10 +286,13 @@ impl Engine {
         let silent_s = now_s - self.arrived_s;
         if silent_s <= self.silence_s {
             let time_s = self.time_s();
-            for actuator in 0..self.judged.len() {
-                let unjudged_s = time_s - self.judged[actuator].1;
-                self.alarmed(out, |alarms, tell| alarms.unjudged(actuator, time_s, unjudged_s, tell));
-            }
+            let judged = std::mem::take(&mut self.judged);
+            self.alarmed(out, |alarms, tell| {
+                for (actuator, (_, judged_s)) in judged.iter().enumerate() {
+                    alarms.unjudged(actuator, time_s, time_s - judged_s, &mut *tell);
+                }
+            });
+            self.judged = judged;
         } else {
             if !self.silent {
                 self.silent = true;

@@ -100,30 +100,14 @@ impl Page {
 
     fn head(&self, out: &mut String) {
         let shared = &self.shared;
-        let summary = shared.summary();
-        let (totals, tally) = (summary.totals, summary.totals.tally);
         key(out, "time_s");
         number(out, shared.time_s());
         key(out, "state");
         text(out, shared.state());
         key(out, "health");
         out.push('{');
-        let counts = [
-            ("received", tally.received),
-            ("lost", tally.lost),
-            ("repeated", tally.repeated),
-            ("reordered", tally.reordered),
-            ("malformed", totals.malformed),
-            ("refused", totals.refused),
-            ("filled", tally.filled),
-            ("restarts", tally.restarts),
-            ("readings", totals.readings),
-            ("valid", totals.valid),
-            ("log_dropped", summary.log_dropped),
-            ("unsent", summary.unsent),
-            ("not_written", summary.not_written),
-        ];
-        for (name, count) in counts {
+        // The alarms themselves stand beside it.
+        for (name, count) in shared.summary().named().into_iter().filter(|(name, _)| *name != "alarms") {
             key(out, name);
             whole(out, count);
         }

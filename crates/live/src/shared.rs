@@ -25,6 +25,31 @@ pub struct Summary {
     pub not_written: u64,
 }
 
+impl Summary {
+    /// All of it, by the names that the page, the terminal and Python know.
+    pub fn named(&self) -> [(&'static str, u64); 14] {
+        let Summary { totals, log_dropped, unsent, not_written } = *self;
+        let Totals { tally, malformed, refused, readings, valid, alarms } = totals;
+        let Tally { received, lost, repeated, reordered, filled, restarts } = tally;
+        [
+            ("received", received),
+            ("lost", lost),
+            ("repeated", repeated),
+            ("reordered", reordered),
+            ("malformed", malformed),
+            ("readings", readings),
+            ("valid", valid),
+            ("alarms", alarms),
+            ("filled", filled),
+            ("restarts", restarts),
+            ("refused", refused),
+            ("log_dropped", log_dropped),
+            ("unsent", unsent),
+            ("not_written", not_written),
+        ]
+    }
+}
+
 /// A number that one thread writes and others read.
 #[derive(Debug)]
 struct Seen(AtomicU64);

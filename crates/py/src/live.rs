@@ -112,26 +112,8 @@ impl Live {
     }
 
     fn summary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let summary = self.run.summary();
-        let (totals, tally) = (summary.totals, summary.totals.tally);
-        let counts = [
-            ("received", tally.received),
-            ("lost", tally.lost),
-            ("repeated", tally.repeated),
-            ("reordered", tally.reordered),
-            ("malformed", totals.malformed),
-            ("readings", totals.readings),
-            ("valid", totals.valid),
-            ("alarms", totals.alarms),
-            ("filled", tally.filled),
-            ("restarts", tally.restarts),
-            ("refused", totals.refused),
-            ("log_dropped", summary.log_dropped),
-            ("unsent", summary.unsent),
-            ("not_written", summary.not_written),
-        ];
         let dict = PyDict::new(py);
-        counts.iter().try_for_each(|(name, count)| dict.set_item(name, count))?;
+        self.run.summary().named().iter().try_for_each(|(name, count)| dict.set_item(name, count))?;
         Ok(dict)
     }
 

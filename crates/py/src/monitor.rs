@@ -21,7 +21,7 @@ type Arrays<'py> = (
 
 /// `rthstrack.MonitorSettings`, read by its attributes.
 #[derive(FromPyObject)]
-pub(crate) struct MonitorSettings {
+struct MonitorSettings {
     rate_hz: f64,
     window_s: f64,
     update_hz: f64,
@@ -39,7 +39,7 @@ pub(crate) struct MonitorSettings {
 
 impl MonitorSettings {
     /// Names become the core's own choices.
-    pub(crate) fn config(&self, py: Python<'_>) -> PyResult<MonitorConfig> {
+    fn config(&self, py: Python<'_>) -> PyResult<MonitorConfig> {
         Ok(MonitorConfig {
             rate_hz: self.rate_hz,
             window_s: self.window_s,
@@ -135,7 +135,7 @@ pub(crate) fn causal_decimate<'py>(
 }
 
 /// Readings as columns.
-pub(crate) fn arrays<'py>(py: Python<'py>, readings: &[Reading]) -> Arrays<'py> {
+fn arrays<'py>(py: Python<'py>, readings: &[Reading]) -> Arrays<'py> {
     let numbers = |of: fn(&Reading) -> f64| readings.iter().map(of).collect::<Vec<_>>().into_pyarray(py);
     let pairs = |of: fn(&Tracking) -> (f64, f64)| {
         let rows: Vec<[f64; 2]> = readings.iter().map(|r| of(&r.tracking)).map(|(low, high)| [low, high]).collect();
