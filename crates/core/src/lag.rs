@@ -6,7 +6,8 @@
 //!
 //! summed over the judged samples, the target taken from outside the window where there is some; each lag is divided by the
 //! energy of its own stretch of target. Both signals are first averaged over as many samples as leave nine tenths of the
-//! target's energy (a straight line taken out): a peak needs no more resolution than a fifth of the shortest period.
+//! target's energy (a straight line taken out): a peak needs no more resolution than a fifth of the shortest period, as it is
+//! read from the cosine through the three entries around it, which is the correlation of a narrow band, and nearly that of others.
 
 use pulp::{Arch, NullaryFnOnce};
 
@@ -21,12 +22,20 @@ const KEPT_ENERGY: f64 = 0.9;
 pub(crate) const MAX_STEP: usize = 64;
 /// Averaged samples that are correlated at most: the stretch in which the target moves most.
 const MAX_STRETCH: usize = 8192;
-/// Places at which a stretch may start.
-const STRETCH_STEP: usize = 1024;
-/// Peaks that are looked at.
-pub(crate) const MAX_PEAKS: usize = 4;
+/// Samples that are looked at, before averaging, at most: likewise.
+const LONGEST: usize = 1 << 20;
+/// How many times as far is looked where measured seems to move against target.
+const FARTHER: usize = 4;
+/// Fewest cycles of the target in the window: more than half a wave, whose delay cannot be told from an offset.
+const MIN_CYCLES: f64 = 0.6;
+/// Peaks that are looked at: a tone has as many as it has turns within reach.
+pub(crate) const MAX_PEAKS: usize = 64;
 /// A peak lower than the highest by more than this is another lag's, even at the resolution of the search.
 const PEAK_MARGIN: f64 = 0.05;
+/// The peak nearest to the expected delay is looked at down to this.
+const EXPECTED_MARGIN: f64 = 0.2;
+/// By how much the lowest correlation must outdo the highest before measured is said to move against target.
+const OPPOSITE_MARGIN: f64 = 0.1;
 
 /// A stretch of both signals, by their index in the record.
 #[derive(Debug, Clone, Copy)]
@@ -62,8 +71,6 @@ pub(crate) struct Peak {
 pub(crate) struct Peaks {
     peaks: [Peak; MAX_PEAKS],
     n_peaks: usize,
-    /// The lowest correlation at any lag.
-    pub(crate) lowest: f64,
     /// Samples from one lag looked at to the next.
     pub(crate) step: usize,
     /// The largest lag looked at, in samples.
@@ -73,9 +80,14 @@ pub(crate) struct Peaks {
 }
 
 impl Peaks {
-    /// Highest first; only those that may be as high as the first.
+    /// Highest first; only those that may be as high as the first, and the one nearest to the expected delay.
     pub(crate) fn peaks(&self) -> &[Peak] {
         &self.peaks[..self.n_peaks]
+    }
+
+    /// The highest.
+    pub(crate) fn first(&self) -> Peak {
+        self.peaks[0]
     }
 }
 
@@ -87,6 +99,7 @@ pub(crate) struct Search {
     max_step: usize,
     /// Largest lag looked at, a multiple of it.
     reach: usize,
+    rate_hz: f64,
     arch: Arch,
 }
 
@@ -98,13 +111,28 @@ pub(crate) struct SearchState {
     correlations: Vec<f64>,
 }
 
+/// Correlations that stand in the state, from the largest lag to the largest lead.
+#[derive(Debug, Clone, Copy)]
+struct Correlated {
+    /// How many there are to either side of no lag.
+    lags: usize,
+    /// Samples from one to the next.
+    step: usize,
+    /// Cycles that the target moves through.
+    cycles: f64,
+    /// The lowest and the highest of them.
+    lowest: f64,
+    highest: f64,
+}
+
 impl Search {
-    /// For windows of `n_samples`, lags of up to `max_delay` samples either way (the window's length at most).
-    pub(crate) fn new(n_samples: usize, max_delay: f64) -> Self {
+    /// For windows of `n_samples`, lags of up to `max_delay_s` either way (the window's length at most).
+    pub(crate) fn new(n_samples: usize, rate_hz: f64, max_delay_s: f64) -> Self {
+        let max_delay = max_delay_s * rate_hz;
         let wanted = (max_delay.ceil() as usize).clamp(1, n_samples.max(1));
         let most = MAX_STEP.min(wanted / 4).min(n_samples / 64).max(1);
         let max_step = 1 << most.ilog2();
-        Self { n_samples, max_step, reach: wanted.next_multiple_of(max_step), arch: Arch::new() }
+        Self { n_samples, max_step, reach: wanted.next_multiple_of(max_step), rate_hz, arch: Arch::new() }
     }
 
     /// The largest lag looked at, in samples.
@@ -113,23 +141,66 @@ impl Search {
     }
 
     pub(crate) fn state(&self) -> SearchState {
-        let longest = self.n_samples + 2 * self.reach;
+        let searched = self.n_samples.min(LONGEST);
         SearchState {
-            target: vec![0.0; longest],
-            measured: vec![0.0; self.n_samples],
+            target: vec![0.0; searched + 2 * self.reach],
+            measured: vec![0.0; searched],
             correlations: vec![0.0; 2 * self.reach + 1],
         }
     }
 
     /// The peaks for the window that starts at sample `start` of the record. Where the record does not go on beyond the
     /// window, lags of up to a quarter of it are looked at, so that half of it is left to compare.
-    pub(crate) fn peaks(&self, state: &mut SearchState, view: &View<'_>, start: usize) -> Result<Peaks, Reason> {
+    pub(crate) fn peaks(
+        &self,
+        state: &mut SearchState,
+        view: &View<'_>,
+        start: usize,
+        expected: Option<f64>,
+    ) -> Result<Peaks, Reason> {
         let outside = (start - view.origin).min(view.end() - (start + self.n_samples));
         let reach = self.reach.min(outside.max(self.n_samples / 4)) / self.max_step * self.max_step;
-        let from = start.max(view.origin + reach);
-        let to = (start + self.n_samples).min(view.end().saturating_sub(reach));
+        let near = self.correlate(state, view, start, reach)?;
+        if near.cycles < MIN_CYCLES {
+            return Err(Reason::FewCycles { found: near.cycles });
+        }
+        let mut found = Peaks {
+            peaks: [Peak::default(); MAX_PEAKS],
+            n_peaks: 0,
+            step: near.step,
+            reach,
+            cycles: near.cycles,
+        };
+        found.collect(&state.correlations[..2 * near.lags + 1], near, expected);
+        if -near.lowest > near.highest + OPPOSITE_MARGIN {
+            // Half a cycle out of reach looks like a sign: what moves along farther away tells.
+            let farther = (FARTHER.min(near.step) * reach).min(2 * self.n_samples / 5) / self.max_step * self.max_step;
+            let beyond = farther > reach
+                && self.correlate(state, view, start, farther).is_ok_and(|far| far.highest > -near.lowest);
+            return Err(if beyond { Reason::BeyondMaxDelay { max_delay_s: reach as f64 / self.rate_hz } } else { Reason::OppositeSign });
+        }
+        if found.n_peaks == 0 {
+            return Err(Reason::Still);
+        }
+        Ok(found)
+    }
+
+    /// Correlates at lags of up to `reach` samples to either side.
+    fn correlate(
+        &self,
+        state: &mut SearchState,
+        view: &View<'_>,
+        start: usize,
+        reach: usize,
+    ) -> Result<Correlated, Reason> {
+        let mut from = start.max(view.origin + reach);
+        let mut to = (start + self.n_samples).min(view.end().saturating_sub(reach));
         if reach == 0 || to < from + 2 * self.max_step.max(4) {
             return Err(Reason::TooShort { n_samples: to.saturating_sub(from) });
+        }
+        if to - from > LONGEST {
+            from += liveliest(&view.target[from - view.origin..to - view.origin], LONGEST);
+            to = from + LONGEST;
         }
         let SearchState { target, measured, correlations } = state;
         let asked = &view.target[from - reach - view.origin..to + reach - view.origin];
@@ -149,14 +220,16 @@ impl Search {
             step /= 2;
         }
         let n = n / step;
-        let n_target = n + 2 * (reach / step);
+        // What is looked at farther away is as much as there is room for.
+        let lags = (reach / step).min(correlations.len() / 2).min((target.len() - n) / 2);
+        let asked = &asked[reach - lags * step..];
+        let n_target = n + 2 * lags;
         sums::block_means(asked, step, &mut target[..n_target]);
         sums::block_means(answered, step, &mut measured[..n]);
-        let lags = reach / step;
         let cycles = cycles(&target[lags..lags + n]);
         take_line(&mut target[..n_target], lags..lags + n);
         take_line(&mut measured[..n], 0..n);
-        let at = liveliest(&target[lags..lags + n]);
+        let at = liveliest(&target[lags..lags + n], MAX_STRETCH);
         let n = n.min(MAX_STRETCH);
         let (target, measured) = (&target[at..at + n + 2 * lags], &mut measured[at..at + n]);
         let mean = sums::sum(measured) / n as f64;
@@ -167,11 +240,13 @@ impl Search {
         let round_off = 1e-13 * sums::energy(target);
         let (mut sum, mut squares): (f64, f64) = target[..n].iter().fold((0.0, 0.0), |(s, q), v| (s + v, q + v * v));
         let mut moved = false;
+        let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
         for k in 0..correlations.len() {
             let own = squares - sum * sum / n as f64;
             let comparable = own > round_off && spread > 0.0;
             moved |= comparable;
             correlations[k] = if comparable { correlations[k] / (own.sqrt() * spread.sqrt()) } else { 0.0 };
+            (lowest, highest) = (lowest.min(correlations[k]), highest.max(correlations[k]));
             if k + 1 < correlations.len() {
                 let (leaves, enters) = (target[k], target[k + n]);
                 sum += enters - leaves;
@@ -181,16 +256,15 @@ impl Search {
         if !moved {
             return Err(Reason::Still);
         }
-        // Entry k compares with the target k - lags steps later: the lag falls with k.
-        let lag = |k: f64| (lags as f64 - k) * step as f64;
-        let mut found = Peaks {
-            peaks: [Peak::default(); MAX_PEAKS],
-            n_peaks: 0,
-            lowest: correlations.iter().copied().fold(f64::INFINITY, f64::min),
-            step,
-            reach,
-            cycles,
-        };
+        Ok(Correlated { lags, step, cycles, lowest, highest })
+    }
+}
+
+impl Peaks {
+    /// Takes the peaks of what stands at `correlations`, highest first.
+    fn collect(&mut self, correlations: &[f64], searched: Correlated, expected: Option<f64>) {
+        let Correlated { lags, step, .. } = searched;
+        let mut nearest: Option<Peak> = None;
         for k in 0..correlations.len() {
             let here = correlations[k];
             let before = if k == 0 { f64::NEG_INFINITY } else { correlations[k - 1] };
@@ -198,22 +272,29 @@ impl Search {
             if here < before || here <= after || here.is_nan() {
                 continue;
             }
-            let curvature = before + after - 2.0 * here;
-            let inside = curvature.is_finite() && curvature < 0.0;
-            let shift = if inside { (0.5 * (before - after) / curvature).clamp(-0.5, 0.5) } else { 0.0 };
-            let top = if inside { here + 0.25 * (after - before) * shift } else { here };
-            found.keep(Peak { lag: lag(k as f64 + shift), correlation: top });
+            let (shift, top) = if before.is_finite() && after.is_finite() { summit(before, here, after) } else { (0.0, here) };
+            // Entry k compares with the target k - lags steps later: the lag falls with k.
+            let peak = Peak { lag: (lags as f64 - (k as f64 + shift)) * step as f64, correlation: top };
+            if let Some(expected) = expected
+                && nearest.is_none_or(|p| (peak.lag - expected).abs() < (p.lag - expected).abs())
+            {
+                nearest = Some(peak);
+            }
+            self.keep(peak);
         }
-        let best = found.peaks[0].correlation;
-        found.n_peaks = found.peaks[..found.n_peaks].iter().filter(|p| p.correlation >= best - PEAK_MARGIN).count();
-        if found.n_peaks == 0 {
-            return Err(Reason::Still);
+        let best = self.first().correlation;
+        let high = self.peaks[..self.n_peaks].iter().filter(|p| p.correlation >= best - PEAK_MARGIN).count();
+        self.n_peaks = high;
+        if let Some(peak) = nearest
+            && peak.correlation >= best - EXPECTED_MARGIN
+            && self.peaks().iter().all(|p| p.lag != peak.lag)
+        {
+            let at = self.n_peaks.min(MAX_PEAKS - 1);
+            self.peaks[at] = peak;
+            self.n_peaks = at + 1;
         }
-        Ok(found)
     }
-}
 
-impl Peaks {
     /// Inserts in order, dropping the lowest.
     fn keep(&mut self, peak: Peak) {
         let at =
@@ -224,6 +305,26 @@ impl Peaks {
             self.peaks[at] = peak;
         }
     }
+}
+
+/// Where between its neighbours, and how high, the cosine through three entries around a peak is highest:
+/// cos w = (b + a) / 2h,  tan(w x) = (a - b) / (2 h sin w); the parabola's where there is no such cosine.
+fn summit(before: f64, here: f64, after: f64) -> (f64, f64) {
+    let cosine = 0.5 * (before + after) / here;
+    if here > 0.0 && cosine.abs() < 1.0 {
+        let omega = cosine.acos();
+        let angle = (0.5 * (after - before) / (here * omega.sin())).atan();
+        let shift = angle / omega;
+        if shift.abs() <= 1.0 {
+            return (shift, here / angle.cos());
+        }
+    }
+    let curvature = before + after - 2.0 * here;
+    if curvature < 0.0 {
+        let shift = (0.5 * (before - after) / curvature).clamp(-0.5, 0.5);
+        return (shift, here + 0.25 * (after - before) * shift);
+    }
+    (0.0, here)
 }
 
 /// Takes from all samples the least-squares line of those in `own`.
@@ -242,14 +343,14 @@ fn cycles(samples: &[f64]) -> f64 {
     if velocity > 0.0 { n * (acceleration / velocity).sqrt() / (2.0 * std::f64::consts::PI) } else { 0.0 }
 }
 
-/// Where the [`MAX_STRETCH`] samples of most energy start.
-fn liveliest(samples: &[f64]) -> usize {
-    if samples.len() <= MAX_STRETCH {
+/// Where the `most` samples of most energy start, in steps of an eighth of that.
+fn liveliest(samples: &[f64], most: usize) -> usize {
+    if samples.len() <= most {
         return 0;
     }
-    let starts = (0..=samples.len() - MAX_STRETCH).step_by(STRETCH_STEP);
+    let starts = (0..=samples.len() - most).step_by(most / 8);
     starts
-        .map(|s| (s, sums::energy(&samples[s..s + MAX_STRETCH])))
+        .map(|s| (s, sums::energy(&samples[s..s + most])))
         .fold((0, f64::NEG_INFINITY), |best, next| if next.1 > best.1 { next } else { best })
         .0
 }

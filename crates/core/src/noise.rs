@@ -76,6 +76,17 @@ impl Autoregression {
     }
 }
 
+impl Autoregression {
+    /// The same in place; what comes before the first sample is taken for zero.
+    pub(crate) fn whiten_in_place(&self, samples: &mut [f64]) {
+        for i in (0..samples.len()).rev() {
+            for k in 1..=self.order.min(i) {
+                samples[i] += self.coefficients[k] * samples[i - k];
+            }
+        }
+    }
+}
+
 /// Which combinations of displacement and velocity give the estimates: U = sum_j weights_j G_j, G = (y, y') at the bins.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Influence {

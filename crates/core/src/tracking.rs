@@ -731,7 +731,7 @@ impl Evaluator {
                 stream(pair.target()).zip(stream(pair.measured())).map(|(target, measured)| [target, measured])
             }
         };
-        let expected = self.alignment.as_ref().and_then(|_| Alignment::expected(pair, self.config.max_delay_s));
+        let expected = self.alignment.as_ref().and_then(|_| Alignment::expected(pair, &self.config));
         Moving { evaluator: self, state: self.state(), pair, streams, expected }
     }
 }

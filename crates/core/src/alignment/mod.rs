@@ -24,7 +24,7 @@ use crate::alignment::grid::Grid;
 use crate::alignment::products::{Cross, Multiply, Products};
 use crate::alignment::weighting::{Energies, Weighting};
 use crate::error::Result;
-use crate::lag::{MAX_STEP, Peak, Peaks, Search, SearchState, View};
+use crate::lag::{MAX_PEAKS, MAX_STEP, Peaks, Search, SearchState, View};
 use crate::lagrange::{AFTER, BEFORE, NODES, Taps};
 use crate::noise::{
     Autoregression, Influence, MAX_ORDER, NoisyTarget, Precision, Sampling, Spread, SpreadState, cell_width,
@@ -43,8 +43,6 @@ const LAST_STEP: f64 = 1e-4;
 const LAST_SECANT_STEP: f64 = 2e-3;
 /// Fewest samples that are judged.
 const MIN_SUPPORT: usize = 16;
-/// Fewest cycles of the target in the window: more than half a wave, whose delay cannot be told from an offset.
-const MIN_CYCLES: f64 = 0.6;
 /// Least share of measured that must follow the target.
 const MIN_GOODNESS: f64 = 0.1;
 /// Two delays fit equally well if the likelihood of one is below exp(10) times that of the other.
@@ -55,6 +53,11 @@ const LOW_HZ: f64 = 32.0;
 const SHORTENING: usize = 8;
 /// and where the target's velocity has at most this share of its energy above.
 const HIGH_SHARE: f64 = 0.05;
+/// How often another turn is taken for the likeliest, and by how much of log-likelihood it must be that.
+const MAX_REFERENCES: usize = 3;
+const LEAST_GAIN: f64 = 1.0;
+/// So much less likely, were the noise white, it is less likely in any noise.
+const CLEAR_ODDS: f64 = 1e3 * LOG_ODDS;
 /// A residual of this share of measured is as good as none: that of interpolation, of the last step and of round-off.
 const EXACT: f64 = 1e-11;
 
@@ -93,6 +96,8 @@ pub(crate) struct AlignmentState {
     spread: SpreadState,
     /// Target and measured, less what an autoregression predicts of the noise.
     whitened: [Vec<f64>; 2],
+    /// The best fit's residual, likewise, to compare others with.
+    whitened_residual: Vec<f64>,
     weighting: Weighting,
 }
 
@@ -122,6 +127,57 @@ struct Fit {
     residual: f64,
     /// The share of measured that is explained, where the signals in the state do not tell.
     goodness: Option<f64>,
+}
+
+/// Fits of a tone at one turn and another, and of others that come near each other.
+struct Turns {
+    fits: [Option<Fit>; MAX_PEAKS],
+}
+
+impl Default for Turns {
+    fn default() -> Self {
+        Self { fits: [None; MAX_PEAKS] }
+    }
+}
+
+impl Turns {
+    fn within(&self) -> impl Iterator<Item = &Fit> {
+        self.fits.iter().flatten()
+    }
+
+    fn retain(&mut self, mut keep: impl FnMut(&Fit) -> bool) {
+        for slot in &mut self.fits {
+            *slot = slot.filter(&mut keep);
+        }
+    }
+
+    /// Two neighbours of those that are left, the nearest to no delay first, where it is more than one.
+    fn neighbours(&self) -> Option<[f64; 2]> {
+        let first = self.within().map(|f| f.tau).min_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+        let others = self.within().map(|f| f.tau).filter(|tau| *tau != first);
+        let second = others.min_by(|a, b| (a - first).abs().total_cmp(&(b - first).abs()))?;
+        Some([first, second])
+    }
+}
+
+/// How one residual compares with the least one, both whitened.
+struct Odds {
+    /// sum e^2 - sum e_least^2
+    excess: f64,
+    /// sum e_least^2 (e - e_least)^2
+    variance: f64,
+}
+
+impl Odds {
+    fn of(residual: &[f64], least: &[f64]) -> Self {
+        let (mut excess, mut variance) = (0.0, 0.0);
+        for (e, least) in residual.iter().zip(least) {
+            let d = e - least;
+            excess += d * (e + least);
+            variance += (least * d) * (least * d);
+        }
+        Self { excess, variance }
+    }
 }
 
 impl Alignment {
@@ -155,7 +211,7 @@ impl Alignment {
             detrend: config.detrend,
             moments: window.as_deref().map_or((0.0, 0.0), moments),
             window,
-            search: Search::new(n_samples, config.max_delay_s * rate_hz),
+            search: Search::new(n_samples, rate_hz, config.max_delay_s),
             kept: Grid::new(plan)?,
             low: low.transpose()?,
             in_time: config.estimator == Estimator::LeastSquares && undecimated && exact_target,
@@ -175,6 +231,7 @@ impl Alignment {
             low: self.low.as_ref().map(|low| (low.spectrum.scratch(), vec![0.0; n.div_ceil(low.step)])),
             spread: SpreadState::new(self.kept.spectrum.n_bins()),
             whitened: std::array::from_fn(|_| vec![0.0; whitened]),
+            whitened_residual: vec![0.0; n],
             weighting: Weighting {
                 weights: vec![0.0; weighted],
                 factors: vec![0.0; weighted],
@@ -205,30 +262,22 @@ impl Alignment {
         start: usize,
         expected: Option<f64>,
     ) -> std::result::Result<Tracking, Reason> {
-        let peaks = self.search.peaks(&mut state.search, view, start)?;
-        if peaks.cycles < MIN_CYCLES {
-            return Err(Reason::FewCycles { found: peaks.cycles });
-        }
-        let highest = peaks.peaks().first().map_or(0.0, |p| p.correlation);
-        if -peaks.lowest > highest + 0.1 {
-            return Err(Reason::OppositeSign);
-        }
+        let peaks = self.search.peaks(&mut state.search, view, start, expected)?;
         let limit = self.limit(&peaks);
         if self.noise_ratio > 0.0 {
-            self.weigh_bins(state, view, start, peaks.peaks()[0].lag);
-            let (first, _) = self.best(state, view, start, peaks.peaks(), peaks.step, limit, expected, true)?;
+            self.weigh_bins(state, view, start, peaks.first().lag);
+            let (first, _) = self.best(state, view, start, &peaks, limit, expected, true)?;
             // Once more at a delay that leaves nothing but noise.
             self.weigh_bins(state, view, start, first.tau);
-            let around = Peak { lag: first.tau, correlation: 1.0 };
-            let (best, support) = self.best(state, view, start, &[around], peaks.step, limit, None, true)?;
+            let (best, support) = self.around(state, view, start, first.tau, peaks.step, true)?;
             return self.complete(state, view, start, &peaks, best, support);
         }
-        let mut found = self.best(state, view, start, peaks.peaks(), peaks.step, limit, expected, false);
+        let mut found = self.best(state, view, start, &peaks, limit, expected, false);
         if found.is_err() && !self.in_time {
             // An offset that no bin holds may be all that the samples have in common.
-            found = self.best(state, view, start, peaks.peaks(), peaks.step, limit, expected, true);
+            found = self.best(state, view, start, &peaks, limit, expected, true);
         }
-        let at_the_end = peaks.peaks()[0].lag.abs() + peaks.step as f64 > limit;
+        let at_the_end = peaks.first().lag.abs() + peaks.step as f64 > limit;
         let (best, support) = match found {
             Err(Reason::NoConvergence) if at_the_end => {
                 return Err(Reason::BeyondMaxDelay { max_delay_s: limit / self.rate_hz });
@@ -250,8 +299,7 @@ impl Alignment {
                 noise.whiten(&view.target[part.clone()], &mut first[..n]);
                 noise.whiten(&view.measured[part], &mut second[..n]);
                 let view = View { target: &first[..n], measured: &second[..n], origin: from + p };
-                let around = Peak { lag: best.tau, correlation: 1.0 };
-                let found = self.best(state, &view, start, &[around], peaks.step, limit, None, false).and_then(
+                let found = self.around(state, &view, start, best.tau, peaks.step, false).and_then(
                     |(best, support)| {
                         // Whitening leaves less of the motion than of the noise; that says nothing of the tracking.
                         self.complete(state, &view, start, &peaks, Fit { goodness, ..best }, support)
@@ -285,6 +333,8 @@ impl Alignment {
             let room = (0.2 * self.n_samples as f64 / peaks.cycles).min(self.search.reach() as f64).max(2.0);
             support = self.support(view, start, best.tau - room, best.tau + room);
             let goodness = best.goodness;
+            self.check_support(&support)?;
+            self.place_answer(state, view, start, &support, true);
             best = Fit { goodness, ..self.refine(state, view, start, &support, best.tau, room, true)? };
         }
         self.check_delay(best.tau, peaks)?;
@@ -353,60 +403,148 @@ impl Alignment {
         state: &mut AlignmentState,
         view: &View<'_>,
         start: usize,
-        peaks: &[Peak],
-        step: usize,
+        found: &Peaks,
         limit: f64,
         expected: Option<f64>,
         in_bins: bool,
     ) -> std::result::Result<(Fit, Range<usize>), Reason> {
-        let room = step as f64 + 2.0;
-        // Each later look may go one sample further.
-        let around = |least: f64, most: f64| self.support(view, start, least - room - 3.0, most + room + 3.0);
+        let (peaks, step) = (found.peaks(), found.step);
         let distance = |lag: f64| expected.map_or(0.0, |expected| (lag - expected).abs());
-        let Some(highest) = peaks.first() else { return Err(Reason::Still) };
         // One peak, or the highest is nearest to the expected delay: nothing to choose between.
-        let is_nearest = peaks.iter().all(|p| distance(p.lag) >= distance(highest.lag));
-        if peaks.len() == 1 || (expected.is_some() && is_nearest) {
-            let support = around(highest.lag, highest.lag);
-            let fit = self.refine(state, view, start, &support, highest.lag, room, in_bins)?;
-            return Ok((fit, support));
+        let is_nearest = expected.is_some() && peaks.iter().all(|p| distance(p.lag) >= distance(found.first().lag));
+        if peaks.len() == 1 || is_nearest {
+            return self.around(state, view, start, found.first().lag, step, in_bins);
         }
+        let room = room(step);
         let lags = || peaks.iter().map(|p| p.lag);
-        let support = around(lags().fold(f64::INFINITY, f64::min), lags().fold(f64::NEG_INFINITY, f64::max));
-        let mut fits: [Option<Fit>; crate::lag::MAX_PEAKS] = [None; crate::lag::MAX_PEAKS];
-        for (slot, peak) in fits.iter_mut().zip(peaks) {
-            // Twice, so that no step is left that the residual would show.
-            let found = self.refine(state, view, start, &support, peak.lag, room, in_bins);
-            let found = found.and_then(|f| self.refine(state, view, start, &support, f.tau, 1.0, in_bins));
-            *slot = found.ok().filter(|f| f.tau.abs() <= limit * (1.0 + 1e-9));
+        let (least, most) = (lags().fold(f64::INFINITY, f64::min), lags().fold(f64::NEG_INFINITY, f64::max));
+        // All are judged on the same samples.
+        let support = self.support_around(view, start, least, most, step);
+        self.check_support(&support)?;
+        self.place_answer(state, view, start, &support, in_bins);
+        let mut turns = Turns::default();
+        for (i, peak) in peaks.iter().enumerate() {
+            let fit = self.refine(state, view, start, &support, peak.lag, room, in_bins);
+            let fit = fit.ok().filter(|f| f.tau.abs() <= limit * (1.0 + 1e-9));
+            // Two peaks may lead to one place.
+            turns.fits[i] = fit.filter(|f| !turns.within().any(|other| (other.tau - f.tau).abs() <= 1.0));
         }
-        let Some(best) = fits.iter().flatten().copied().min_by(|a, b| a.residual.total_cmp(&b.residual)) else {
+        let Some(best) = turns.within().copied().min_by(|a, b| a.residual.total_cmp(&b.residual)) else {
             return Err(Reason::NoConvergence);
         };
-        // The residual's signals are needed to tell how many independent samples it has.
-        let again = self.refine(state, view, start, &support, best.tau, 1.0, in_bins)?;
-        self.leave_residual(state, &again, start, &support);
-        let freedom = independent(&state.signals.measured[support.start - start..support.end - start]);
-        let floor = EXACT * best.products.oo;
-        let equal = |f: &Fit| {
-            let odds = 0.5 * freedom * (f.residual.max(floor) / best.residual.max(floor)).ln();
-            odds < LOG_ODDS && (f.tau - best.tau).abs() > 1.0
-        };
-        let mut chosen = best;
-        if let Some(other) = fits.iter().flatten().find(|f| equal(f)) {
-            if expected.is_none() {
-                let (delay_s, other_s) = (best.tau / self.rate_hz, other.tau / self.rate_hz);
-                return Err(Reason::Ambiguous { delay_s, other_s });
-            }
-            for f in fits.iter().flatten().filter(|f| equal(f)) {
-                if distance(f.tau) < distance(chosen.tau) {
-                    chosen = *f;
+        let mut chosen = self.keep_equal(state, view, start, &support, &mut turns, best, in_bins);
+        if expected.is_some() {
+            let nearer = |c: Fit, f: &Fit| if distance(f.tau) < distance(c.tau) { *f } else { c };
+            chosen = turns.within().fold(chosen, nearer);
+        } else if let Some(neighbours) = turns.neighbours() {
+            let [delay_s, other_s] = neighbours.map(|tau| tau / self.rate_hz);
+            return Err(Reason::Ambiguous { delay_s, other_s });
+        }
+        self.around(state, view, start, chosen.tau, step, in_bins)
+    }
+
+    /// The fit nearest to `lag`, whose signals stand in the state afterwards.
+    fn around(
+        &self,
+        state: &mut AlignmentState,
+        view: &View<'_>,
+        start: usize,
+        lag: f64,
+        step: usize,
+        in_bins: bool,
+    ) -> std::result::Result<(Fit, Range<usize>), Reason> {
+        let support = self.support_around(view, start, lag, lag, step);
+        self.check_support(&support)?;
+        self.place_answer(state, view, start, &support, in_bins);
+        let fit = self.refine(state, view, start, &support, lag, room(step), in_bins)?;
+        Ok((fit, support))
+    }
+
+    /// The support of a search from `least` to `most`.
+    fn support_around(&self, view: &View<'_>, start: usize, least: f64, most: f64, step: usize) -> Range<usize> {
+        // Each later look may go one sample further.
+        let room = room(step) + 3.0;
+        self.support(view, start, least - room, most + room)
+    }
+
+    /// Keeps of `turns` those that fit as well as the likeliest, which is returned: whose likelihood is not below its by
+    /// exp([`LOG_ODDS`]). `least` has the least residual.
+    ///
+    /// With the noise whitened by an autoregression of the likeliest one's residual, D = sum e^2 - sum e_best^2, the odds are
+    /// exp(n/2 log(sum e^2 / sum e_best^2)), or exp(D^2 / 2 V), V = sum e_best^2 (e - e_best)^2, where the noise changes over
+    /// time; the lower count. Over bins, the residual's correlation tells how many samples are independent.
+    fn keep_equal(
+        &self,
+        state: &mut AlignmentState,
+        view: &View<'_>,
+        start: usize,
+        support: &Range<usize>,
+        turns: &mut Turns,
+        least: Fit,
+        in_bins: bool,
+    ) -> Fit {
+        let within = support.start - start..support.end - start;
+        let floor = EXACT * least.products.oo;
+        let white = |freedom: f64, f: &Fit| 0.5 * freedom * (f.residual.max(floor) / least.residual.max(floor)).ln();
+        if in_bins {
+            self.place_residual(state, view, start, support, &least);
+            let freedom = independent(&state.signals.measured[within]);
+            turns.retain(|f| white(freedom, f) < LOG_ODDS);
+            return least;
+        }
+        let (weight, _) = self.window_moments(&within);
+        turns.retain(|f| white(weight, f) < CLEAR_ODDS);
+        let n = within.len();
+        let mut whitened = std::mem::take(&mut state.whitened_residual);
+        let mut best = least;
+        // What is least when every sample weighs alike need not be the likeliest in coloured noise.
+        for _ in 0..MAX_REFERENCES {
+            self.place_residual(state, view, start, support, &best);
+            let noise = self.autoregression(state, start, support);
+            whitened[..n].copy_from_slice(&state.signals.measured[within.clone()]);
+            noise.whiten_in_place(&mut whitened[..n]);
+            let all = sums::energy(&whitened[..n]).max(floor);
+            let (mut likelier, mut most) = (None, -LEAST_GAIN * all / weight);
+            let mut equal = Turns { fits: turns.fits };
+            equal.retain(|f| {
+                if f.tau == best.tau {
+                    return true;
+                }
+                self.place_residual(state, view, start, support, f);
+                let other = &mut state.signals.measured[within.clone()];
+                noise.whiten_in_place(other);
+                let odds = Odds::of(other, &whitened[..n]);
+                if odds.excess < most {
+                    (likelier, most) = (Some(*f), odds.excess);
+                }
+                let excess = odds.excess.max(0.0);
+                let of_spectrum = 0.5 * weight * ((all + excess) / all).ln();
+                of_spectrum < LOG_ODDS || 0.5 * excess * excess / odds.variance < LOG_ODDS
+            });
+            match likelier {
+                Some(fit) => best = fit,
+                None => {
+                    *turns = equal;
+                    break;
                 }
             }
         }
-        let support = around(chosen.tau, chosen.tau);
-        let fit = self.refine(state, view, start, &support, chosen.tau, room, in_bins)?;
-        Ok((fit, support))
+        state.whitened_residual = whitened;
+        best
+    }
+
+    /// What a fit leaves of measured, in measured's place.
+    fn place_residual(
+        &self,
+        state: &mut AlignmentState,
+        view: &View<'_>,
+        start: usize,
+        support: &Range<usize>,
+        fit: &Fit,
+    ) {
+        self.place_measured(state, view, start, support);
+        self.place_target(state, view, start, support, fit.tau);
+        self.leave_residual(state, &Fit { step: 0.0, ..*fit }, start, support);
     }
 
     /// The samples of the window for which the target is known at all delays from `least` to `most`, in samples.
@@ -425,7 +563,24 @@ impl Alignment {
         Ok(())
     }
 
-    /// Newton's steps from `tau`, at most `room` samples away from it, on sums over samples or over the kept bins.
+    /// Places measured, and transforms it where sums over bins are asked for.
+    fn place_answer(
+        &self,
+        state: &mut AlignmentState,
+        view: &View<'_>,
+        start: usize,
+        support: &Range<usize>,
+        in_bins: bool,
+    ) {
+        self.place_measured(state, view, start, support);
+        if in_bins {
+            let AlignmentState { signals, bins, scratch, .. } = state;
+            self.kept.spectrum.transform_one(scratch, &signals.measured, None, &mut bins[MEASURED]);
+        }
+    }
+
+    /// Newton's steps from `tau`, at most `room` samples away from it, on sums over samples or over the kept bins; measured
+    /// stands in the state.
     fn refine(
         &self,
         state: &mut AlignmentState,
@@ -436,16 +591,6 @@ impl Alignment {
         room: f64,
         in_bins: bool,
     ) -> std::result::Result<Fit, Reason> {
-        self.check_support(support)?;
-        self.place_measured(state, view, start, support);
-        if in_bins {
-            self.kept.spectrum.transform_one(
-                &mut state.scratch,
-                &state.signals.measured,
-                None,
-                &mut state.bins[MEASURED],
-            );
-        }
         let (low, high) = (tau - room, tau + room);
         // Where the score is known to be positive (the delay is larger) and negative.
         let (mut below, mut above) = (low, high);
@@ -480,15 +625,17 @@ impl Alignment {
             }
             if step.abs() < last_step || above - below < LAST_STEP {
                 let step = step.clamp(-last_step, last_step);
-                let Products { yy, yv, vv, oy, ov, .. } = products;
+                let Products { yy, yv, vv, oy, ov, oo } = products;
+                // The target is y - step y' at the delay found, and the best gain moves with it.
+                let (along, energy) = (oy - step * ov, yy - 2.0 * step * yv + step * step * vv);
+                let gain = score.gain * along / oy * yy / energy;
                 return Ok(Fit {
                     tau: now + step,
                     step,
-                    // The best gain moves with the target, which is y - step y' at the delay found.
-                    gain: score.gain * (1.0 - step * ov / oy) * yy / (yy - 2.0 * step * yv + step * step * vv),
+                    gain,
                     products,
                     clean: score.clean,
-                    residual: score.residual,
+                    residual: (oo - 2.0 * gain * along + gain * gain * energy).max(0.0),
                     goodness: None,
                 });
             }
@@ -622,9 +769,8 @@ impl Alignment {
         // d/dtau of -|o - K y|^2 / 2 is -K <o - K y, y'>: with y' the slope in time, a delay larger than tau makes it positive.
         let value = -(p.ov - gain * p.yv) - pull;
         let slope = gain * (clean.vv - clean.yv * clean.yv / clean.yy);
-        let residual = (p.oo - 2.0 * gain * p.oy + gain * gain * p.yy).max(0.0);
         let usable = gain > 0.0 && slope > 0.0 && slope.is_finite() && value.is_finite();
-        usable.then_some(Score { value, slope, gain, clean, residual })
+        usable.then_some(Score { value, slope, gain, clean })
     }
 
     /// measured becomes measured less the fit; returns which share of it the fit explains, 1 - sum e^2 / sum (o - mean)^2.
@@ -900,14 +1046,25 @@ impl Alignment {
         tracking
     }
 
-    /// The delay of the highest correlation peak of the whole record, in samples, where no other comes near it.
-    pub(crate) fn expected(pair: &crate::Pair<'_>, max_delay_s: f64) -> Option<f64> {
-        let search = Search::new(pair.n_samples(), max_delay_s * pair.rate_hz());
-        let peaks = search.peaks(&mut search.state(), &View::whole(pair), 0).ok()?;
-        match peaks.peaks() {
-            [only] => Some(only.lag),
-            _ => None,
+    /// The delay of the whole record, in samples, as far as it can be told: of the only peak of the correlation, or of the one
+    /// that fits better than all others.
+    pub(crate) fn expected(pair: &crate::Pair<'_>, config: &EvaluatorConfig) -> Option<f64> {
+        let search = Search::new(pair.n_samples(), pair.rate_hz(), config.max_delay_s);
+        let view = View::whole(pair);
+        let peaks = search.peaks(&mut search.state(), &view, 0, None).ok()?;
+        if let [only] = peaks.peaks() {
+            return Some(only.lag);
         }
+        let config = EvaluatorConfig {
+            estimator: Estimator::LeastSquares,
+            max_delay_s: config.max_delay_s,
+            detrend: Detrend::Mean,
+            ..EvaluatorConfig::default()
+        };
+        let whole = Self::new(pair.n_samples(), pair.rate_hz(), &config).ok()?;
+        let mut state = whole.state();
+        let best = whole.best(&mut state, &view, 0, &peaks, whole.limit(&peaks), None, false);
+        best.ok().map(|(fit, _)| fit.tau)
     }
 }
 
@@ -929,7 +1086,11 @@ struct Score {
     slope: f64,
     gain: f64,
     clean: Products,
-    residual: f64,
+}
+
+/// How far from a peak of a search by steps of so many samples its place is looked for.
+fn room(step: usize) -> f64 {
+    step as f64 + 2.0
 }
 
 /// The sample that precedes t - tau, relative to t, and the way to the next.
