@@ -164,20 +164,19 @@ impl Search {
         if near.cycles < MIN_CYCLES {
             return Err(Reason::FewCycles { found: near.cycles });
         }
-        let mut found = Peaks {
-            peaks: [Peak::default(); MAX_PEAKS],
-            n_peaks: 0,
-            step: near.step,
-            reach,
-            cycles: near.cycles,
-        };
+        let mut found =
+            Peaks { peaks: [Peak::default(); MAX_PEAKS], n_peaks: 0, step: near.step, reach, cycles: near.cycles };
         found.collect(&state.correlations[..2 * near.lags + 1], near, expected);
         if -near.lowest > near.highest + OPPOSITE_MARGIN {
             // Half a cycle out of reach looks like a sign: what moves along farther away tells.
             let farther = (FARTHER.min(near.step) * reach).min(2 * self.n_samples / 5) / self.max_step * self.max_step;
             let beyond = farther > reach
                 && self.correlate(state, view, start, farther).is_ok_and(|far| far.highest > -near.lowest);
-            return Err(if beyond { Reason::BeyondMaxDelay { max_delay_s: reach as f64 / self.rate_hz } } else { Reason::OppositeSign });
+            return Err(if beyond {
+                Reason::BeyondMaxDelay { max_delay_s: reach as f64 / self.rate_hz }
+            } else {
+                Reason::OppositeSign
+            });
         }
         if found.n_peaks == 0 {
             return Err(Reason::Still);
@@ -272,7 +271,8 @@ impl Peaks {
             if here < before || here <= after || here.is_nan() {
                 continue;
             }
-            let (shift, top) = if before.is_finite() && after.is_finite() { summit(before, here, after) } else { (0.0, here) };
+            let (shift, top) =
+                if before.is_finite() && after.is_finite() { summit(before, here, after) } else { (0.0, here) };
             // Entry k compares with the target k - lags steps later: the lag falls with k.
             let peak = Peak { lag: (lags as f64 - (k as f64 + shift)) * step as f64, correlation: top };
             if let Some(expected) = expected

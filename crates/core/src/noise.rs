@@ -3,12 +3,21 @@
 //! An estimate is linear in the noise e where it is small, theta - theta_0 = sum u_i e_i, so that its variance is the mean
 //! over frequency of |U_k|^2 S_k, S the noise's spectrum. S is taken from the residual: whitened by an autoregression, its
 //! periodogram is flat enough to be averaged over wide blocks of bins, each corrected for what the fit has taken out of it.
+//!
+//! That is the variance were the noise as strong throughout. Where it changes over time, with white noise eps behind e = eps / A
+//! and h = u / A (backwards in time), the variance is sum h_i^2 E eps_i^2 (White 1980, here of what an autoregression leaves):
+//! [`Changes`] holds its quotient by the steady one, by which the above is multiplied.
 
 use crate::quantile::student_t_975;
 use crate::spectrum::{Bins, LANES, Sink};
 use crate::sums;
 use num_complex::Complex;
+use pulp::{Arch, NullaryFnOnce};
 
+/// Cells at most; in longer records they hold more bins.
+const MAX_CELLS: usize = 1 << 16;
+/// Bins that are taken together, where noise changes over time, at most.
+const MOST_ALIKE: f64 = 8.0;
 /// Highest order of the autoregression.
 pub(crate) const MAX_ORDER: usize = 4;
 /// Least of |A|^2 over its mean: no noise spectrum rises higher above the rest.
@@ -84,6 +93,160 @@ impl Autoregression {
                 samples[i] += self.coefficients[k] * samples[i - k];
             }
         }
+    }
+}
+
+/// Samples that are whitened at once.
+const STRIP: usize = 64;
+/// Lanes of the sums over them.
+const WIDE: usize = 8;
+
+/// What the noise's changes over time do to a variance.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Changes {
+    /// sum h^2 eps^2 over what it is on average, were eps steady: of gain and delay.
+    pub(crate) gain: f64,
+    pub(crate) delay: f64,
+    /// Relative variances of these quotients.
+    gain_uncertainty: f64,
+    delay_uncertainty: f64,
+    /// n sum s^4 / (sum s^2)^2 of its strength s: 1 where it is steady, n over the number of samples that hold it all.
+    pub(crate) concentration: f64,
+}
+
+impl Changes {
+    /// No changes.
+    pub(crate) const NONE: Self =
+        Self { gain: 1.0, delay: 1.0, gain_uncertainty: 0.0, delay_uncertainty: 0.0, concentration: 1.0 };
+
+    /// How many pieces of noise that is strong for a while are alike.
+    fn alike(&self) -> f64 {
+        self.concentration.min(MOST_ALIKE)
+    }
+
+    /// From the residual e, displacement y and velocity y' (all windowed alike, by `window` where there is one).
+    pub(crate) fn of(
+        noise: &Autoregression,
+        [residual, y, velocity]: [&[f64]; 3],
+        window: Option<&[f64]>,
+        influence: &Influence,
+    ) -> Self {
+        let sums = Arch::new().dispatch(Weigh { noise, residual, y, velocity, window, influence });
+        let Moments { eps, weight, fourth, of } = sums;
+        let n = residual.len() as f64;
+        let ratio = |m: &Moment| m.noisy / m.steady * weight / eps;
+        // Normal numbers: the variance of eps^2 is 2/3 of E eps^4.
+        let uncertainty = |m: &Moment| {
+            let (own, all, both) = (m.fourth / (m.noisy * m.noisy), fourth / (eps * eps), m.cross / (m.noisy * eps));
+            2.0 / 3.0 * (own + all - 2.0 * both).max(0.0)
+        };
+        let [gain, delay] = &of;
+        let found = Self {
+            gain: ratio(gain),
+            delay: ratio(delay),
+            gain_uncertainty: uncertainty(gain),
+            delay_uncertainty: uncertainty(delay),
+            concentration: (n * fourth / (3.0 * eps * eps)).max(1.0),
+        };
+        let known = [found.gain, found.delay, found.gain_uncertainty, found.delay_uncertainty, found.concentration];
+        if known.iter().all(|v| v.is_finite()) { found } else { Self::NONE }
+    }
+}
+
+/// Sums over the samples: eps^2, w^2, eps^4, and those of gain and delay.
+struct Moments {
+    eps: f64,
+    weight: f64,
+    fourth: f64,
+    of: [Moment; 2],
+}
+
+/// sum h^2 eps^2, sum h^2 w^2, sum h^4 eps^4, sum h^2 eps^4
+#[derive(Clone, Copy, Default)]
+struct Moment {
+    noisy: f64,
+    steady: f64,
+    fourth: f64,
+    cross: f64,
+}
+
+/// [`Moments`], compiled for the processor at hand.
+struct Weigh<'a> {
+    noise: &'a Autoregression,
+    residual: &'a [f64],
+    y: &'a [f64],
+    velocity: &'a [f64],
+    window: Option<&'a [f64]>,
+    influence: &'a Influence,
+}
+
+impl NullaryFnOnce for Weigh<'_> {
+    type Output = Moments;
+
+    #[inline(always)]
+    fn call(self) -> Moments {
+        let Self { noise: Autoregression { coefficients: a, order }, residual, y, velocity, window, influence } = self;
+        let factors = [influence.gain, influence.delay];
+        let n = residual.len();
+        let zero = [0.0; WIDE];
+        let (mut eps, mut weight, mut fourth) = (zero, zero, zero);
+        let mut of = [[zero; 4]; 2];
+        // h of y and of y' that come later.
+        let mut later = [[0.0; 2]; MAX_ORDER];
+        let mut end = n;
+        while end > 0 {
+            let begin = end.saturating_sub(STRIP);
+            let len = end - begin;
+            let (mut e, mut hy, mut hv, mut w) = ([0.0; STRIP], [0.0; STRIP], [0.0; STRIP], [0.0; STRIP]);
+            e[..len].copy_from_slice(&residual[begin..end]);
+            hy[..len].copy_from_slice(&y[begin..end]);
+            hv[..len].copy_from_slice(&velocity[begin..end]);
+            match window {
+                Some(window) => w[..len].copy_from_slice(&window[begin..end]),
+                None => w[..len].fill(1.0),
+            }
+            if *order > 0 {
+                for i in 0..len {
+                    for k in 1..=(*order).min(begin + i) {
+                        e[i] += a[k] * residual[begin + i - k];
+                    }
+                }
+                for i in (0..len).rev() {
+                    for k in 0..*order {
+                        hy[i] -= a[k + 1] * later[k][0];
+                        hv[i] -= a[k + 1] * later[k][1];
+                    }
+                    later.rotate_right(1);
+                    later[0] = [hy[i], hv[i]];
+                }
+            }
+            for part in 0..STRIP / WIDE {
+                let at = part * WIDE;
+                for i in 0..WIDE {
+                    let (square, share) = (e[at + i] * e[at + i], w[at + i] * w[at + i]);
+                    eps[i] += square;
+                    weight[i] += share;
+                    fourth[i] += square * square;
+                    for (sums, f) in of.iter_mut().zip(&factors) {
+                        let h = f[0] * hy[at + i] + f[1] * hv[at + i];
+                        let both = h * h * square;
+                        sums[0][i] += both;
+                        sums[1][i] += h * h * share;
+                        sums[2][i] += both * both;
+                        sums[3][i] += both * square;
+                    }
+                }
+            }
+            end = begin;
+        }
+        let total = |lanes: &[f64; WIDE]| lanes.iter().sum::<f64>();
+        let of = of.map(|[noisy, steady, fourth, cross]| Moment {
+            noisy: total(&noisy),
+            steady: total(&steady),
+            fourth: total(&fourth),
+            cross: total(&cross),
+        });
+        Moments { eps: total(&eps), weight: total(&weight), fourth: total(&fourth), of }
     }
 }
 
@@ -173,6 +336,7 @@ pub(crate) struct Spread<'a> {
     forms: Forms,
     sampling: Sampling,
     noisy_target: Option<NoisyTarget<'a>>,
+    changes: Changes,
     /// Whether the pair is (y, y') or (y, residual).
     residual: bool,
 }
@@ -198,7 +362,7 @@ pub(crate) struct SpreadState(Vec<Cell>);
 impl SpreadState {
     /// For `n_bins` bins; a cell holds at least [`FINE`] of them.
     pub(crate) fn new(n_bins: usize) -> Self {
-        Self(vec![Cell::default(); n_bins / FINE as usize + 2])
+        Self(vec![Cell::default(); (n_bins / FINE as usize + 2).min(MAX_CELLS)])
     }
 }
 
@@ -213,8 +377,9 @@ impl<'a> Spread<'a> {
         influence: Influence,
         sampling: Sampling,
         noisy_target: Option<NoisyTarget<'a>>,
+        changes: Changes,
     ) -> Self {
-        let width = cell_width(sampling.bins_per_piece);
+        let width = cell_width(sampling.bins_per_piece * changes.alike()).max(cosines.len().div_ceil(MAX_CELLS));
         let cells = &mut state.0[..cosines.len().div_ceil(width)];
         cells.fill(Cell::default());
         Self {
@@ -229,6 +394,7 @@ impl<'a> Spread<'a> {
             forms: influence.forms(),
             sampling,
             noisy_target,
+            changes,
             residual: false,
         }
     }
@@ -265,7 +431,8 @@ impl<'a> Spread<'a> {
             return None;
         }
         let half = (n_samples as f64).powf(0.4).max(FEWEST);
-        let cells_per_block = ((2.0 * half / FINE).round() as usize).clamp(1, self.cells.len());
+        let pieces_per_cell = self.width as f64 / (bins_per_piece * self.changes.alike());
+        let cells_per_block = ((2.0 * half / pieces_per_cell).round() as usize).clamp(1, self.cells.len());
         // A last block that is not full joins the one before it.
         let n_blocks = (self.cells.len() / cells_per_block).max(1);
         let (mut gain, mut delay) = (Variance::default(), Variance::default());
@@ -281,6 +448,9 @@ impl<'a> Spread<'a> {
             gain.add(scale * sum(|c| total(&c.gain)), density, pieces);
             delay.add(scale * sum(|c| total(&c.delay)), density, pieces);
         }
+        let Changes { concentration, .. } = self.changes;
+        let gain = gain.changed(self.changes.gain, self.changes.gain_uncertainty, concentration);
+        let delay = delay.changed(self.changes.delay, self.changes.delay_uncertainty, concentration);
         let (coherence, coherent) = self.coherence();
         Some(Precision {
             gain_std: gain.value.sqrt(),
@@ -332,6 +502,14 @@ impl Variance {
     fn add(&mut self, weight: f64, density: f64, pieces: f64) {
         self.value += weight * density;
         self.uncertainty += (weight * density) * (weight * density) / pieces;
+    }
+
+    /// Times `factor`, itself known to a relative variance; fewer samples than all hold the noise by `concentration`.
+    fn changed(&self, factor: f64, relative_variance: f64, concentration: f64) -> Self {
+        let value = self.value * factor;
+        let relative =
+            2.0 * self.uncertainty / (self.value * self.value) * 0.5 * concentration + 0.5 * relative_variance;
+        Self { value, uncertainty: relative * value * value }
     }
 
     fn reach(&self) -> f64 {

@@ -1,10 +1,9 @@
 //! Frequency bins, of all samples or of averages of a few.
 
-use num_complex::Complex;
+use std::ops::Range;
 
 use crate::error::Result;
-use crate::spectrum::{Scratch, Spectrum, SpectrumConfig};
-use crate::sums;
+use crate::spectrum::{Spectrum, SpectrumConfig};
 
 /// Bins and how to come to them.
 pub(super) struct Grid {
@@ -13,7 +12,7 @@ pub(super) struct Grid {
     pub(super) step: usize,
     /// What makes good the droop of the cascade, or of the averages.
     pub(super) correction: Option<Vec<f64>>,
-    /// cos of the bins' frequencies, in radians a sample.
+    /// cos of the bins' frequencies, in radians a sample (after averaging).
     pub(super) cosines: Vec<f64>,
 }
 
@@ -34,7 +33,7 @@ impl Grid {
             Spectrum::new(SpectrumConfig { n_samples: config.n_samples.div_ceil(step), rate_hz, band_hz, ..config })?;
         let gain = |w: f64| (0.5 * w * step as f64).sin() / (0.5 * w).sin();
         let correction = Some(radians(&spectrum, config.rate_hz).map(|w| (step * step) as f64 / gain(w)).collect());
-        let cosines = radians(&spectrum, config.rate_hz).map(f64::cos).collect();
+        let cosines = radians(&spectrum, rate_hz).map(f64::cos).collect();
         Ok(Self { spectrum, step, correction, cosines })
     }
 
@@ -43,18 +42,9 @@ impl Grid {
         (self.step * self.spectrum.folded_len()) as f64
     }
 
-    pub(super) fn transform(
-        &self,
-        scratch: &mut Scratch,
-        samples: &[f64],
-        averages: &mut [f64],
-        bins: &mut [Complex<f64>],
-    ) {
-        if self.step == 1 {
-            return self.spectrum.transform_one(scratch, samples, None, bins);
-        }
-        sums::block_means(samples, self.step, averages);
-        self.spectrum.transform_one(scratch, averages, None, bins);
+    /// Where the averages of samples in `within` stand, those that are of such samples only.
+    pub(super) fn averaged(&self, within: &Range<usize>) -> Range<usize> {
+        within.start.div_ceil(self.step)..within.end / self.step
     }
 }
 

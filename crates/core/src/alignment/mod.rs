@@ -27,7 +27,7 @@ use crate::error::Result;
 use crate::lag::{MAX_PEAKS, MAX_STEP, Peaks, Search, SearchState, View};
 use crate::lagrange::{AFTER, BEFORE, NODES, Taps};
 use crate::noise::{
-    Autoregression, Influence, MAX_ORDER, NoisyTarget, Precision, Sampling, Spread, SpreadState, cell_width,
+    Autoregression, Changes, Influence, MAX_ORDER, NoisyTarget, Precision, Sampling, Spread, SpreadState, cell_width,
 };
 use crate::reason::Reason;
 use crate::spectrum::{Scratch, SpectrumConfig};
@@ -77,10 +77,35 @@ pub(crate) struct Alignment {
     search: Search,
     kept: Grid,
     /// Lower bins only, for the precision of what is estimated from all of them while the target moves slowly.
-    low: Option<Grid>,
+    low: Option<Low>,
     /// All bins are kept, so that sums over samples serve.
     in_time: bool,
     arch: Arch,
+}
+
+/// Bins of averages of a few samples, and the window at these.
+struct Low {
+    grid: Grid,
+    window: Option<Vec<f64>>,
+}
+
+impl Low {
+    fn new(plan: SpectrumConfig, factor: usize, window: Option<&[f64]>) -> Result<Self> {
+        let grid = Grid::low(plan, factor)?;
+        let window = window.map(|w| {
+            let mut averages = vec![0.0; w.len().div_ceil(grid.step)];
+            sums::block_means(w, grid.step, &mut averages);
+            averages
+        });
+        Ok(Self { grid, window })
+    }
+}
+
+/// Buffers of the same: averages of residual, displacement and velocity.
+#[derive(Debug, Clone)]
+struct LowState {
+    scratch: Scratch,
+    averages: [Vec<f64>; 3],
 }
 
 /// Its buffers.
@@ -91,8 +116,7 @@ pub(crate) struct AlignmentState {
     /// Transforms of displacement, velocity, and measured or residual.
     bins: [Vec<Complex<f64>>; 3],
     scratch: Scratch,
-    /// Of the lower bins, and room for averages.
-    low: Option<(Scratch, Vec<f64>)>,
+    low: Option<LowState>,
     spread: SpreadState,
     /// Target and measured, less what an autoregression predicts of the noise.
     whitened: [Vec<f64>; 2],
@@ -199,7 +223,7 @@ impl Alignment {
         let window = config.window.coefficients(n_samples);
         let low = 1usize << (rate_hz / (2.0 * LOW_HZ)).clamp(1.0, 1e6).log2() as u32;
         let low = (undecimated && exact_target && low >= SHORTENING && n_samples >= 2 * low * low)
-            .then(|| Grid::low(plan, low));
+            .then(|| Low::new(plan, low, window.as_deref()));
         Ok(Self {
             estimator: config.estimator,
             n_samples,
@@ -228,7 +252,10 @@ impl Alignment {
             signals: Signals { measured: vec![0.0; n], shifted: vec![0.0; n], slope: vec![0.0; n] },
             bins: std::array::from_fn(|_| self.kept.spectrum.packed()),
             scratch: self.kept.spectrum.scratch(),
-            low: self.low.as_ref().map(|low| (low.spectrum.scratch(), vec![0.0; n.div_ceil(low.step)])),
+            low: self.low.as_ref().map(|low| LowState {
+                scratch: low.grid.spectrum.scratch(),
+                averages: std::array::from_fn(|_| vec![0.0; n.div_ceil(low.grid.step)]),
+            }),
             spread: SpreadState::new(self.kept.spectrum.n_bins()),
             whitened: std::array::from_fn(|_| vec![0.0; whitened]),
             whitened_residual: vec![0.0; n],
@@ -299,12 +326,11 @@ impl Alignment {
                 noise.whiten(&view.target[part.clone()], &mut first[..n]);
                 noise.whiten(&view.measured[part], &mut second[..n]);
                 let view = View { target: &first[..n], measured: &second[..n], origin: from + p };
-                let found = self.around(state, &view, start, best.tau, peaks.step, false).and_then(
-                    |(best, support)| {
+                let found =
+                    self.around(state, &view, start, best.tau, peaks.step, false).and_then(|(best, support)| {
                         // Whitening leaves less of the motion than of the noise; that says nothing of the tracking.
                         self.complete(state, &view, start, &peaks, Fit { goodness, ..best }, support)
-                    },
-                );
+                    });
                 state.whitened = [first, second];
                 return found;
             }
@@ -718,12 +744,8 @@ impl Alignment {
         if let Some(line) = self.detrend.line(samples) {
             line.subtract_from(samples);
         }
-        self.taper(samples, within);
-    }
-
-    fn taper(&self, samples: &mut [f64], within: &Range<usize>) {
         if let Some(window) = &self.window {
-            samples.iter_mut().zip(&window[within.clone()]).for_each(|(v, w)| *v *= w);
+            taper(samples, &window[within.clone()]);
         }
     }
 
@@ -949,44 +971,33 @@ impl Alignment {
         averaged: Option<Averaged>,
     ) -> Option<Precision> {
         let within = support.start - start..support.end - start;
-        let noise = self.autoregression(state, start, support);
+        let (window_power, fourths) = self.window_moments(&within);
         let AlignmentState {
             signals: Signals { measured, shifted, slope }, bins, scratch, low, spread, weighting, ..
         } = state;
-        let slow = |low: &Grid| {
-            let share = 2.0 * (std::f64::consts::PI / (8 * low.step) as f64).sin();
+        let slow = |low: &Low| {
+            let share = 2.0 * (std::f64::consts::PI / (8 * low.grid.step) as f64).sin();
             let velocity = &slope[within.clone()];
             sums::step_energy(velocity) <= HIGH_SHARE * share * share * sums::energy(velocity)
         };
-        let (grid, scratch, averages) = match (&self.low, low) {
-            (Some(grid), Some((scratch, averages))) if slow(grid) => (grid, scratch, averages.as_mut_slice()),
-            _ => (&self.kept, scratch, &mut [][..]),
+        let mut lowered = match (&self.low, low) {
+            (Some(plan), Some(state)) if slow(plan) => Some((plan, state)),
+            _ => None,
         };
-        let spectrum = &grid.spectrum;
-        let [y, v, e] = bins.each_mut().map(|b| &mut b[..spectrum.packed_len()]);
-        grid.transform(scratch, measured, averages, e);
-        // The estimate is a sum over w (w y), so the noise is seen through the window twice; where the record is folded upon
-        // itself, what is summed is w y over noise of the mean of w^2.
-        let folded_up = grid.folded_len() < within.len() as f64;
-        let tapered = !folded_up && self.window.is_some();
-        // What the fit, or the equivalent frequency, has transformed already.
-        let of_kept = std::ptr::eq(grid, &self.kept) && !tapered;
-        let stand = [of_kept, of_kept && !self.in_time && averaged.is_none()];
-        for ((signal, bins), stands) in [(&mut *shifted, &mut *y), (&mut *slope, &mut *v)].into_iter().zip(stand) {
-            if tapered {
-                self.taper(&mut signal[within.clone()], &within);
+        let window = match &lowered {
+            Some((plan, _)) => plan.window.as_deref(),
+            None => self.window.as_deref(),
+        };
+        let (grid, scratch, judged, [e, y, v]) = match &mut lowered {
+            Some((plan, LowState { scratch, averages })) => {
+                for (signal, averages) in [&*measured, &*shifted, &*slope].into_iter().zip(&mut *averages) {
+                    sums::block_means(signal, plan.grid.step, averages);
+                }
+                (&plan.grid, scratch, plan.grid.averaged(&within), averages.each_mut().map(|a| a.as_mut_slice()))
             }
-            if !stands {
-                grid.transform(scratch, signal, averages, bins);
-            }
-        }
-        let (window_power, fourths) = self.window_moments(&within);
+            None => (&self.kept, scratch, within.clone(), [&mut measured[..], &mut shifted[..], &mut slope[..]]),
+        };
         let folded = grid.folded_len();
-        let sampling = Sampling {
-            window_power,
-            bins_per_piece: (folded * fourths / (window_power * window_power)).max(1.0),
-            scale: 0.5 * if folded_up { window_power } else { folded },
-        };
         // Sums over samples are 2 / n times those over bins.
         let to_bins = if self.in_time { 0.5 * folded } else { 1.0 };
         let influence = match averaged {
@@ -1006,6 +1017,34 @@ impl Alignment {
                 }
             }
         };
+        let noise = Autoregression::fit(&e[judged.clone()], window_power * window_power / fourths / grid.step as f64);
+        let changes = {
+            let window = window.map(|w| &w[judged.clone()]);
+            Changes::of(&noise, [&e[judged.clone()], &y[judged.clone()], &v[judged.clone()]], window, &influence)
+        };
+        let spectrum = &grid.spectrum;
+        let [yk, vk, ek] = bins.each_mut().map(|b| &mut b[..spectrum.packed_len()]);
+        spectrum.transform_one(scratch, e, None, ek);
+        // The estimate is a sum over w (w y), so the noise is seen through the window twice; where the record is folded upon
+        // itself, what is summed is w y over noise of the mean of w^2.
+        let folded_up = folded < within.len() as f64;
+        // What the fit, or the equivalent frequency, has transformed already.
+        let of_kept = std::ptr::eq(grid, &self.kept);
+        let stand = [of_kept, of_kept && !self.in_time && averaged.is_none()];
+        for ((signal, bins), stands) in [(&mut *y, &mut *yk), (&mut *v, &mut *vk)].into_iter().zip(stand) {
+            let tapered = window.filter(|_| !folded_up);
+            if let Some(window) = tapered {
+                taper(signal, window);
+            }
+            if !stands || tapered.is_some() {
+                spectrum.transform_one(scratch, signal, None, bins);
+            }
+        }
+        let sampling = Sampling {
+            window_power,
+            bins_per_piece: (folded * fourths / (window_power * window_power)).max(1.0),
+            scale: 0.5 * if folded_up { window_power } else { folded },
+        };
         let noisy_target = (self.noise_ratio > 0.0).then(|| NoisyTarget {
             weights: &weighting.weights,
             share: fit.gain / (self.noise_ratio.powi(-2) + fit.gain * fit.gain),
@@ -1013,14 +1052,14 @@ impl Alignment {
         let correction = grid.correction.as_deref();
         let first = spectrum.first();
         let mut spread =
-            Spread::new(spread, first, &grid.cosines, correction, &noise, influence, sampling, noisy_target);
-        spectrum.visit_pair([y, v], &mut spread);
+            Spread::new(spread, first, &grid.cosines, correction, &noise, influence, sampling, noisy_target, changes);
+        spectrum.visit_pair([yk, vk], &mut spread);
         spread.residual_next();
-        spectrum.visit_pair([y, e], &mut spread);
+        spectrum.visit_pair([yk, ek], &mut spread);
         if self.in_time {
             // At zero frequency there is no bin, but there may be much of the target.
-            let zero = |x: &[f64]| sums::sum(&x[within.clone()]);
-            spread.zero_frequency(zero(shifted), zero(slope), zero(measured));
+            let zero = |x: &[f64]| grid.step as f64 * sums::sum(x);
+            spread.zero_frequency(zero(y), zero(v), zero(e));
         }
         spread.precision(within.len())
     }
@@ -1086,6 +1125,10 @@ struct Score {
     slope: f64,
     gain: f64,
     clean: Products,
+}
+
+fn taper(samples: &mut [f64], window: &[f64]) {
+    samples.iter_mut().zip(window).for_each(|(v, w)| *v *= w);
 }
 
 /// How far from a peak of a search by steps of so many samples its place is looked for.
