@@ -377,6 +377,20 @@ def test_evaluating_does_not_touch_the_callers_arrays() -> None:
     assert np.array_equal(measured, kept[1])
 
 
+def test_the_latest_plans_are_kept_up_to_so_many_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+    from rthstrack import tracking
+
+    monkeypatch.setattr(tracking, "_MOST_PLANNED", 1000)
+    monkeypatch.setattr(tracking, "_plans", type(tracking._plans)())
+    chosen = rthstrack.Settings()
+    first, second = tracking._plan(400, RATE, chosen), tracking._plan(500, RATE, chosen)
+    assert tracking._plan(1001, RATE, chosen) is not tracking._plan(1001, RATE, chosen)
+    assert tracking._plan(400, RATE, chosen) is first
+    tracking._plan(300, RATE, chosen)  # in place of the one that was not asked for the longest
+    assert [n for n, *_ in tracking._plans] == [400, 300]
+    assert tracking._plan(500, RATE, chosen) is not second
+
+
 @settings(max_examples=20)
 @given(seeds)
 def test_threads_share_a_plan_and_get_the_same_bits(seed: int) -> None:

@@ -364,6 +364,9 @@ def test_the_estimator_asked_for_gives_the_top_level_numbers_and_takes_the_limit
         ["--estimator", "aligned", "--decimator", "chebyshev", "-P", "4"],
         ["--estimator", "least_squares", "-P", "auto"],
         ["--max-delay", "0"],
+        ["--expected-delay", "0.3"],
+        ["--expected-delay", "-0.1", "--max-delay", "0.05", "--estimator", "aligned"],
+        ["--expected-delay", "nan"],
     ],
     ids=" ".join,
 )
@@ -381,7 +384,61 @@ def test_options_of_the_estimators_reach_them(capsys: pytest.CaptureFixture[str]
     chosen = ["--estimator", "least_squares", "--noise-ratio", "1", "--max-delay", "0.1"]
     assert main(["evaluate", str(file), *chosen, "--json"]) == 0
     (result,) = json.loads(capsys.readouterr().out)["results"]
-    assert {"noise_ratio": 1.0, "max_delay_s": 0.1, "noise": "white"}.items() <= result["settings"].items()
+    told = {"noise_ratio": 1.0, "max_delay_s": 0.1, "expected_delay_s": None, "noise": "white"}
+    assert told.items() <= result["settings"].items()
+
+
+PERIOD_S = 0.2  # of `sine`
+
+
+@pytest.mark.parametrize("estimator", ["fei", "aligned", "least_squares"])
+def test_of_turns_of_a_tone_the_trusted_estimate_takes_the_one_nearest_to_the_expected_delay(estimator: str) -> None:
+    target, measured = sine(T), sine(T - 0.02) + noise(1e-3)
+    assert "ambiguous" in assessed(target, measured, estimator=estimator).trusted.reason
+    for expected, delay in [(0, 0.02), (np.float32(0.15), 0.02 + PERIOD_S), (-0.25, 0.02 - PERIOD_S)]:
+        found = assessed(target, measured, estimator=estimator, expected_delay_s=expected)
+        assert found.trusted.delay_s == pytest.approx(delay, abs=physical(10.0, "us"))
+        assert found.trusted_moving is not None
+        np.testing.assert_allclose(found.trusted_moving.delay_s, delay, atol=physical(50.0, "us"))
+        assert found.settings["expected_delay_s"] == found.trusted.settings.expected_delay_s == pytest.approx(expected)
+        # The published evaluation looks for no turn: half of one is its most.
+        own = 0.02 if estimator == "fei" else delay
+        assert found.tracking.delay_s == pytest.approx(own, abs=physical(20.0, "us"))
+
+
+def test_an_expected_delay_is_for_the_estimators_that_look_for_one() -> None:
+    for call in (rthstrack.evaluate, rthstrack.evaluate_moving):
+        with pytest.raises(rthstrack.SettingError, match=r"expected_delay_s = 0.01 goes only with estimator"):
+            call(burst(), burst(), RATE, expected_delay_s=0.01)
+        for wrong in ("soon", 0.3, -0.3, math.nan, math.inf):
+            with pytest.raises(rthstrack.SettingError, match=r"expected_delay_s must be (a number|at most)"):
+                call(burst(), burst(), RATE, estimator="aligned", expected_delay_s=wrong)
+    with pytest.raises(rthstrack.SettingError, match=r"expected_delay_s must be at most max_delay_s, 0.25 s, either"):
+        assessed(burst(), burst(), expected_delay_s=0.3)
+
+
+def test_the_expected_delay_of_the_command_line_is_the_trusted_estimates(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    file = saved(tmp_path, sine(T), sine(T - 0.02) + noise(1e-3))
+    report = tmp_path / "report.html"
+    assert main(["evaluate", str(file), "--expected-delay", "0", "--json", "--report", str(report)]) == 0
+    (result,) = json.loads(capsys.readouterr().out)["results"]
+    assert result["trusted"]["delay_s"] == pytest.approx(0.02, abs=physical(10.0, "us"))
+    assert (result["settings"]["estimator"], result["settings"]["expected_delay_s"]) == ("fei", 0.0)
+    page = report.read_text(encoding="utf-8")
+    assert '>Expected delay</th><td data-setting="expected_delay_s">0 s<' in page
+    assert "of turns that fit equally well the one nearest to 0 s" in page
+    study = ["study", str(file), "-P", "1", "-Q", "1", "--windows", "boxcar", "--no-timing", "--json"]
+    assert main([*study, "--estimator", "aligned", "--expected-delay", "0.2"]) == 0
+    found = json.loads(capsys.readouterr().out)["study"]
+    assert found["settings"]["expected_delay_s"] == 0.2
+    assert [cell["delay_s"] for cell in found["cells"]] == pytest.approx([0.22], abs=physical(20.0, "us"))
+    assert main([*study, "--expected-delay", "0.2"]) == 2
+    assert "expected_delay_s = 0.2 goes only with estimator aligned or least_squares" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main([*study, "--estimator", "aligned", "--expected-delay", "0.3"])
+    assert "--expected-delay: expected at most --max-delay, 0.25 s, found 0.3" in capsys.readouterr().err
 
 
 def test_study_takes_the_estimators_too(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

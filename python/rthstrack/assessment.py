@@ -120,7 +120,8 @@ def assess(
 ) -> Assessment:
     """Judges one pair in every way there is: whole record, moving windows, over frequency, indices, warnings.
 
-    target, measured: (n_samples,) in `unit` (and `measured_unit`, the same unless given); settings: of `evaluate`.
+    target, measured: (n_samples,) in `unit` (and `measured_unit`, the same unless given); settings: of `evaluate`;
+    their expected_delay_s is the trusted estimate's too, and its alone where the estimator is "fei".
     choose: "P", "Q" or both are chosen within `tolerance` (`choose_factors`), in place of those in settings. They fit
     the whole record only: moving windows have 1 in their place.
     moving_s, hop_s: moving windows; by default 4 s but at most a quarter of the record, sixteen readings a window.
@@ -129,7 +130,8 @@ def assess(
     Raises SignalError, SettingError; where only the moving evaluation or the frequency response is impossible, it is
     None and its note says why, unless `moving_s` or `hop_s` asked for it.
     """
-    settings = settings or Settings()
+    asked_for = settings or Settings()
+    settings = without_trusted(asked_for)
     t = np.ascontiguousarray(target, dtype=np.float64)
     m = np.ascontiguousarray(measured, dtype=np.float64)
     factors = _chosen(t, m, rate_hz, settings, choose, tolerance) if choose else None
@@ -139,7 +141,7 @@ def assess(
     asked = moving_s is not None or hop_s is not None
     window_s = min(MOVING_S, t.size / rate_hz / 4) if moving_s is None else moving_s
     hop_s = max(window_s / READINGS_PER_WINDOW, 1 / rate_hz) if hop_s is None else hop_s
-    trusted_settings = _trusted(for_record)
+    trusted_settings = _trusted(for_record, asked_for.expected_delay_s)
     trusted = tracking
     if tracking.settings != trusted_settings:
         trusted = Evaluator(t.size, rate_hz, trusted_settings).evaluate(t, m)
@@ -163,13 +165,14 @@ def assess(
     except (SettingError, SignalError) as error:
         slopes_note = f"not determined: {error}"
     response, response_note = _response(t, m, rate_hz, slopes, trusted)
-    variants = _variants(t, m, tracking, slopes) if words.differ(tracking, trusted) else {}
+    variants = _variants(t, m, tracking, trusted_settings, slopes) if words.differ(tracking, trusted) else {}
     limits = limits or Limits()
     names = (target_name, measured_name)
     units = (unit, measured_unit or unit)
     warnings = words.warnings(t, m, tracking, moving, response, units, names)
     argument, said = words.argument(t, tracking, trusted, trusted_moving, slopes, variants, warnings)
     evaluation = dataclasses.asdict(tracking.settings) | _factor_settings(factors)
+    evaluation["expected_delay_s"] = trusted_settings.expected_delay_s
     return Assessment(
         file=file,
         actuator=actuator,
@@ -206,7 +209,12 @@ def assess(
     )
 
 
-def _trusted(settings: Settings) -> Settings:
+def without_trusted(settings: Settings) -> Settings:
+    """The settings of the estimator asked for, without what speaks of the trusted estimate beside it."""
+    return dataclasses.replace(settings, expected_delay_s=None) if settings.estimator == "fei" else settings
+
+
+def _trusted(settings: Settings, expected_delay_s: float | None) -> Settings:
     """Least squares on every sample, with the same window and band; two sensors are never assumed to share a zero."""
     return dataclasses.replace(
         settings,
@@ -216,6 +224,7 @@ def _trusted(settings: Settings) -> Settings:
         decimator="spectral",
         weight_power=2,
         detrend="linear" if settings.detrend == "linear" else "mean",
+        expected_delay_s=expected_delay_s,
     )._checked()
 
 
@@ -256,13 +265,20 @@ def _variants(
     target: NDArray[np.float64],
     measured: NDArray[np.float64],
     tracking: Tracking,
+    trusted: Settings,
     slopes: FrequencySlopes | None,
 ) -> dict[str, Tracking]:
     """The evaluation with one thing changed, each a suspect where it and the trusted estimate differ."""
     settings = tracking.settings
     changes: dict[str, dict[str, Any]] = {
         "window": {"window": "hann" if settings.window == "boxcar" else "boxcar"},
-        "estimator": {"estimator": "aligned", "data_decimation": 1, "frequency_decimation": 1, "decimator": "spectral"},
+        "estimator": {
+            "estimator": "aligned",
+            "data_decimation": 1,
+            "frequency_decimation": 1,
+            "decimator": "spectral",
+            "expected_delay_s": trusted.expected_delay_s,
+        },
     }
     if settings.detrend != "linear":
         changes["detrend"] = {"detrend": "linear"}

@@ -62,6 +62,7 @@ _SETTING_NAMES = {
     "detrend": "Detrend",
     "band_hz": "Band",
     "max_delay_s": "Largest delay looked for",
+    "expected_delay_s": "Expected delay",
     "noise": "Noise on measured",
     "noise_ratio": "Noise on target over that on measured",
     "moving_s": "Moving windows",
@@ -876,12 +877,15 @@ def _settings_table(a: Assessment, version: str, created: datetime) -> str:
     ]
     rows += [(name, *_setting(name, value)) for name, value in _flat(settings)]
     trusted = a.trusted.settings
+    nearest = ""
+    if trusted.expected_delay_s is not None:
+        nearest = f", of turns that fit equally well the one nearest to {trusted.expected_delay_s:g} s"
     rows.append(
         (
             "trusted",
             "Trusted estimate",
             f"least squares, P = Q = 1, {trusted.window}, detrend {trusted.detrend}, {trusted.noise} noise, "
-            f"delays up to {trusted.max_delay_s:g} s",
+            f"delays up to {trusted.max_delay_s:g} s{nearest}",
         )
     )
     if a.response is not None:

@@ -150,6 +150,7 @@ class StudySettings:
     tolerance: float = TOLERANCE
     shares: tuple[float, ...] = ()
     max_delay_s: float = Settings().max_delay_s
+    expected_delay_s: float | None = None
     noise: str = "white"
     noise_ratio: float = 0.0
 
@@ -186,6 +187,7 @@ class StudySettings:
             tolerance,
             shares,
             base.max_delay_s,
+            base.expected_delay_s,
             base.noise,
             base.noise_ratio,
         )
@@ -205,6 +207,7 @@ class StudySettings:
             detrend=self.detrend,
             band_hz=self.band_hz,
             max_delay_s=self.max_delay_s,
+            expected_delay_s=self.expected_delay_s,
             noise=self.noise,
             noise_ratio=self.noise_ratio,
         )
@@ -329,6 +332,7 @@ def study(
     tolerance: float = TOLERANCE,
     shares: Iterable[float] = (),
     max_delay_s: float = Settings().max_delay_s,
+    expected_delay_s: float | None = None,
     noise: str = "white",
     noise_ratio: float = 0.0,
     progress: Callable[[int, int], object] | None = None,
@@ -362,6 +366,7 @@ def study(
         tolerance,
         shares,  # type: ignore[arg-type]
         max_delay_s,
+        expected_delay_s,
         noise,
         noise_ratio,
     ).checked()

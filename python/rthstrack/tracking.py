@@ -9,8 +9,9 @@ from __future__ import annotations
 import dataclasses
 import math
 import operator
+import threading
+from collections import OrderedDict
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
@@ -78,6 +79,7 @@ class Settings:
     detrend: str = "none"
     band_hz: tuple[float, float] | None = None
     max_delay_s: float = 0.25
+    expected_delay_s: float | None = None
     noise: str = "white"
     noise_ratio: float = 0.0
 
@@ -93,6 +95,7 @@ class Settings:
             str(self.detrend),
             _band(self.band_hz),
             _number("max_delay_s", self.max_delay_s),
+            None if self.expected_delay_s is None else _number("expected_delay_s", self.expected_delay_s),
             str(self.noise),
             _number("noise_ratio", self.noise_ratio),
         )
@@ -407,9 +410,26 @@ class IndexHistories(_Result):
         return {"time_s": _time_s(self.rms_error.size, self.rate_hz)} | columns
 
 
-@lru_cache(maxsize=64)
+#: Samples of all plans that are kept for the next call: with its buffers a plan takes some 50 to 250 bytes a sample.
+_MOST_PLANNED = 1 << 22
+_plans: OrderedDict[tuple[int, float, Settings], _core.Evaluator] = OrderedDict()
+_plans_lock = threading.Lock()
+
+
 def _plan(n_samples: int, rate_hz: float, settings: Settings) -> _core.Evaluator:
-    return _core.Evaluator(n_samples, rate_hz, settings)
+    """A plan of these, made anew unless it is among the latest."""
+    key = (n_samples, rate_hz, settings)
+    with _plans_lock:
+        if key in _plans:
+            _plans.move_to_end(key)
+            return _plans[key]
+    made = _core.Evaluator(n_samples, rate_hz, settings)
+    if n_samples <= _MOST_PLANNED:
+        with _plans_lock:
+            _plans[key] = made
+            while sum(n for n, *_ in _plans) > _MOST_PLANNED:
+                _plans.popitem(last=False)
+    return made
 
 
 class Evaluator:
@@ -463,6 +483,7 @@ def evaluate(
     detrend: str = "none",
     band_hz: tuple[float, float] | None = None,
     max_delay_s: float = 0.25,
+    expected_delay_s: float | None = None,
     noise: str = "white",
     noise_ratio: float = 0.0,
     weights: bool = False,
@@ -485,6 +506,8 @@ def evaluate(
     weight_power: l, 1 to 16. window: boxcar, hann, hamming, blackman, flattop or tukey (alpha 0.5).
     detrend: none, mean or linear. band_hz: lowest and highest frequency kept, both included.
     max_delay_s: "aligned" and "least_squares" look for delays and leads up to this, and a quarter of the record.
+    expected_delay_s: of delays that fit them equally well (turns of a motion that is one tone, or nearly) the one
+    nearest to this; None says "ambiguous".
     noise, noise_ratio: of "least_squares" only. noise "coloured": both signals are whitened by an autoregression of
     what a first fit leaves, and fitted again. noise_ratio: standard deviation of the noise on target over that on
     measured; above 0, total least squares over the bins in which both stand clear of white noise.
@@ -511,6 +534,7 @@ def evaluate(
         detrend,
         band_hz,
         max_delay_s,
+        expected_delay_s,
         noise,
         noise_ratio,
     )._checked()
@@ -584,6 +608,7 @@ def evaluate_moving(
     detrend: str = "none",
     band_hz: tuple[float, float] | None = None,
     max_delay_s: float = 0.25,
+    expected_delay_s: float | None = None,
     noise: str = "white",
     noise_ratio: float = 0.0,
 ) -> MovingTracking:
@@ -592,7 +617,7 @@ def evaluate_moving(
     Windows of W = round(window_s rate) samples start at 0, H, 2H, ... with H = round(hop_s rate); each reading of "fei"
     is that of `evaluate` on the window's samples alone, and speaks for the window's centre (start + (W-1)/2) / rate.
     "aligned" and "least_squares" take the shifted target's samples outside the window from the record, and where
-    several delays fit a window equally well, the one nearest to the whole record's.
+    several delays fit a window equally well, the one nearest to expected_delay_s, or else to the whole record's.
     Where the target's standard deviation in the window is below minimum_std_ratio times that of the whole record, or
     nothing is left to judge by, `valid` is False and the numbers are NaN.
 
@@ -609,6 +634,7 @@ def evaluate_moving(
         detrend,
         band_hz,
         max_delay_s,
+        expected_delay_s,
         noise,
         noise_ratio,
     )._checked()

@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::pair::{MIN_SAMPLES, Pair, check_rate, is_fourth_power};
 use crate::reason::Reason;
 use crate::sums;
-use crate::tracking::{Estimator, Evaluator, EvaluatorConfig, EvaluatorState, Tracking};
+use crate::tracking::{Estimator, Evaluator, EvaluatorConfig, EvaluatorState, Tracking, check_expected_delay};
 use crate::window::{Detrend, Window};
 
 /// Samples after decimation that the windows of all actuators may hold.
@@ -196,11 +196,10 @@ impl Monitor {
             let expected = "zero or a positive amplitude".to_owned();
             return setting("minimum_amplitude", expected, config.minimum_amplitude);
         }
-        if let Some(found) = config.expected_delay_s.filter(|d| !d.is_finite()) {
-            return setting("expected_delay_s", "a finite number of seconds".to_owned(), found);
-        }
         let window = samples as usize;
         let evaluator = Evaluator::new(window, rate_hz, config.evaluator()?)?;
+        // `fei` has not seen it.
+        check_expected_delay(config.expected_delay_s, config.max_delay_s)?;
         let before = evaluator.samples_before();
         let hop = (rate_hz / config.update_hz).round().max(1.0) as usize;
         Ok(Self { config, decimator, evaluator, window, before, hop })
@@ -379,9 +378,8 @@ impl Monitor {
         if self.config.minimum_amplitude > 0.0 && amplitude(own) < self.config.minimum_amplitude {
             return Tracking::undetermined(Reason::Still);
         }
-        let expected = self.config.expected_delay_s.map(|d| d * self.evaluated_rate_hz());
         let found = Pair::new(target, measured, self.evaluated_rate_hz())
-            .and_then(|pair| self.evaluator.evaluate_last(state, &pair, expected));
+            .and_then(|pair| self.evaluator.evaluate_last(state, &pair));
         match found {
             Ok(tracking) => tracking,
             Err(Error::NotFinite { .. }) => Tracking::undetermined(Reason::NotFinite),
@@ -423,6 +421,8 @@ impl MonitorConfig {
             detrend: self.detrend,
             band_hz,
             max_delay_s: self.max_delay_s,
+            // `fei` looks for no delay; a monitor may change its estimator and keep the rest.
+            expected_delay_s: self.expected_delay_s.filter(|_| self.estimator != Estimator::Fei),
             ..EvaluatorConfig::default()
         })
     }

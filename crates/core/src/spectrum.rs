@@ -9,7 +9,7 @@
 //! * The real sequence is transformed as half as many complex points, and unpacked while it is summed.
 
 use std::f64::consts::PI;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 use num_complex::Complex;
 use pulp::{Arch, NullaryFnOnce, Simd, WithSimd};
@@ -37,23 +37,28 @@ pub(crate) struct SpectrumConfig {
     pub(crate) band_hz: Option<(f64, f64)>,
 }
 
-/// The checked, immutable plan: one for all records of one length.
-pub(crate) struct Spectrum {
+/// Which bins are kept: what can be said, and refused, before anything is planned.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Layout {
     config: SpectrumConfig,
     fft_len: usize,
     folded_len: usize,
-    window: Option<Vec<f64>>,
-    cascade: Cascade,
-    fft: Arc<dyn Fft<f64>>,
-    unpack: Unpack,
     /// First and last kept bin of the folded transform.
     first: usize,
     last: usize,
+}
+
+/// The checked, immutable plan: one for all records of one length.
+pub(crate) struct Spectrum {
+    layout: Layout,
+    window: Option<Vec<f64>>,
+    cascade: Cascade,
+    transform: Arc<Transform>,
     arch: Arch,
 }
 
 /// Buffers of one evaluation: the packed transforms of both signals and the scratch between.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct SpectrumState {
     pub(crate) target: Vec<Complex<f64>>,
     pub(crate) measured: Vec<Complex<f64>>,
@@ -67,14 +72,14 @@ impl SpectrumState {
 }
 
 /// What one transform needs beside its result.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Scratch {
     /// Input of the cascade, and scratch of the transform: never needed at once.
     transform: Vec<Complex<f64>>,
     passes: Vec<f64>,
 }
 
-impl Spectrum {
+impl Layout {
     /// # Errors
     /// [`Error::NotPowerOfTwo`], [`Error::Band`], [`Error::NoBin`].
     pub(crate) fn new(config: SpectrumConfig) -> Result<Self> {
@@ -114,31 +119,12 @@ impl Spectrum {
                 band_hz: config.band_hz,
             });
         }
-        let folded_len = fft_len / frequency_decimation;
-        let cascade = Cascade::new(folded_len, data_decimation);
-        let half = cascade.out_len() / 2;
-        Ok(Self {
-            config,
-            fft_len,
-            folded_len,
-            window: config.window.coefficients(n_samples),
-            fft: FftPlanner::new().plan_fft_forward(half),
-            unpack: Unpack::new(half),
-            cascade,
-            first,
-            last,
-            arch: Arch::new(),
-        })
+        Ok(Self { config, fft_len, folded_len: fft_len / frequency_decimation, first, last })
     }
 
     /// n, the length of the zero-padded record.
     pub(crate) fn fft_len(&self) -> usize {
         self.fft_len
-    }
-
-    /// n / Q, the length of the folded record.
-    pub(crate) fn folded_len(&self) -> usize {
-        self.folded_len
     }
 
     pub(crate) fn n_bins(&self) -> usize {
@@ -149,10 +135,50 @@ impl Spectrum {
     pub(crate) fn delta_f_hz(&self) -> f64 {
         self.config.rate_hz / self.fft_len as f64 * self.config.frequency_decimation as f64
     }
+}
+
+impl Spectrum {
+    /// # Errors
+    /// Those of [`Layout::new`].
+    pub(crate) fn new(config: SpectrumConfig) -> Result<Self> {
+        Ok(Self::of(Layout::new(config)?))
+    }
+
+    /// The plan of bins that have been checked.
+    pub(crate) fn of(layout: Layout) -> Self {
+        let Layout { config, folded_len, .. } = layout;
+        let cascade = Cascade::new(folded_len, config.data_decimation);
+        Self {
+            layout,
+            window: config.window.coefficients(config.n_samples),
+            transform: Transform::shared(cascade.out_len() / 2),
+            cascade,
+            arch: Arch::new(),
+        }
+    }
+
+    /// n, the length of the zero-padded record.
+    pub(crate) fn fft_len(&self) -> usize {
+        self.layout.fft_len
+    }
+
+    /// n / Q, the length of the folded record.
+    pub(crate) fn folded_len(&self) -> usize {
+        self.layout.folded_len
+    }
+
+    pub(crate) fn n_bins(&self) -> usize {
+        self.layout.n_bins()
+    }
+
+    /// Spacing of the kept bins, Q rate / n, in hertz.
+    pub(crate) fn delta_f_hz(&self) -> f64 {
+        self.layout.delta_f_hz()
+    }
 
     /// Index of the first kept bin in units of [`Spectrum::delta_f_hz`].
     pub(crate) fn first(&self) -> usize {
-        self.first
+        self.layout.first
     }
 
     /// What makes good the droop of the cascade, a factor for each kept bin; `None` where there is no cascade.
@@ -160,7 +186,7 @@ impl Spectrum {
         if self.cascade.is_empty() {
             return None;
         }
-        Some((self.first..=self.last).map(|j| 1.0 / self.cascade.gain(j)).collect())
+        Some((self.layout.first..=self.layout.last).map(|j| 1.0 / self.cascade.gain(j)).collect())
     }
 
     pub(crate) fn state(&self) -> SpectrumState {
@@ -181,7 +207,7 @@ impl Spectrum {
         let input_len =
             if self.cascade.is_empty() { 0 } else { (input_len + ALIGNMENT / size_of::<f64>()).div_ceil(2) };
         Scratch {
-            transform: vec![Complex::new(0.0, 0.0); self.fft.get_inplace_scratch_len().max(input_len)],
+            transform: vec![Complex::new(0.0, 0.0); self.transform.fft.get_inplace_scratch_len().max(input_len)],
             passes: vec![0.0; self.cascade.scratch_len()],
         }
     }
@@ -210,7 +236,7 @@ impl Spectrum {
         let Scratch { transform, passes } = scratch;
         let out = bytemuck::cast_slice_mut(bins);
         self.arch.dispatch(Shorten { plan: self, samples, stream, out, scratch: transform, passes });
-        self.fft.process_with_scratch(bins, transform);
+        self.transform.fft.process_with_scratch(bins, transform);
     }
 
     /// Prepares both signals as [`Spectrum::transform`] does, and stops before the transform.
@@ -225,13 +251,14 @@ impl Spectrum {
     /// Length of the sequence that is transformed, and how much of it may differ from zero.
     pub(crate) fn sequence_len(&self) -> (usize, usize) {
         let len = self.cascade.out_len();
-        (len, if self.cascade.is_empty() { len.min(self.config.n_samples) } else { len })
+        (len, if self.cascade.is_empty() { len.min(self.layout.config.n_samples) } else { len })
     }
 
     /// What windows that start at multiples of `hop` share: the cascade's first pass, where nothing is done to the samples
     /// before it.
     pub(crate) fn stream(&self, samples: &[f64], hop: usize) -> Option<Stream> {
-        let plain = self.window.is_none() && self.config.detrend == Detrend::None && self.folded_len == self.fft_len;
+        let Layout { config, fft_len, folded_len, .. } = self.layout;
+        let plain = self.window.is_none() && config.detrend == Detrend::None && folded_len == fft_len;
         if !plain {
             return None;
         }
@@ -262,8 +289,9 @@ impl Spectrum {
             self.cascade.run_window(simd, samples, stream, input, passes, out);
             return;
         }
-        self.fold(samples, &mut input[start..start + self.folded_len]);
-        self.cascade.run(simd, input, samples.len().min(self.folded_len), passes, out);
+        let folded_len = self.layout.folded_len;
+        self.fold(samples, &mut input[start..start + folded_len]);
+        self.cascade.run(simd, input, samples.len().min(folded_len), passes, out);
     }
 
     /// out[i] = sum over blocks of (w x)[i + block * n / Q], zero past the last sample.
@@ -272,7 +300,7 @@ impl Spectrum {
         // A strip of the output stays in the nearest cache while the blocks pass by.
         const STRIP: usize = 1024;
         let block_len = out.len();
-        let line = self.config.detrend.line(samples);
+        let line = self.layout.config.detrend.line(samples);
         let window = self.window.as_deref();
         for (s, strip) in out.chunks_mut(STRIP).enumerate() {
             let mut at = s * STRIP;
@@ -366,7 +394,7 @@ impl WithSimd for MakeStream<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Option<Stream> {
-        self.plan.cascade.stream(simd, self.samples, self.plan.config.n_samples, self.hop)
+        self.plan.cascade.stream(simd, self.samples, self.plan.layout.config.n_samples, self.hop)
     }
 }
 
@@ -382,9 +410,36 @@ impl<S: Sink, const BOTH: bool> NullaryFnOnce for Visit<'_, S, BOTH> {
 
     #[inline(always)]
     fn call(self) {
-        let Spectrum { unpack, first, last, .. } = self.plan;
+        let Spectrum { layout: Layout { first, last, .. }, transform, .. } = self.plan;
         let [target, measured] = self.pair;
-        unpack.visit::<S, BOTH>(target, measured, *first, *last, self.sink);
+        transform.unpack.visit::<S, BOTH>(target, measured, *first, *last, self.sink);
+    }
+}
+
+/// The transform of a length with its tables.
+struct Transform {
+    fft: Arc<dyn Fft<f64>>,
+    unpack: Unpack,
+}
+
+/// Those in use. Windows, detrending and bands differ from plan to plan; the tables, which outweigh a signal, do not.
+static TRANSFORMS: Mutex<Vec<(usize, Weak<Transform>)>> = Mutex::new(Vec::new());
+
+impl Transform {
+    /// Of `half` complex points: that of another plan where there is one.
+    fn shared(half: usize) -> Arc<Self> {
+        // What is found is whole, whatever became of the thread that held the lock.
+        let lock = || TRANSFORMS.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = lock().iter().find(|(len, _)| *len == half).and_then(|(_, transform)| transform.upgrade());
+        if let Some(known) = known {
+            return known;
+        }
+        // Not under the lock: planning a long one takes a second. Of two threads' the last is known.
+        let made = Arc::new(Self { fft: FftPlanner::new().plan_fft_forward(half), unpack: Unpack::new(half) });
+        let mut transforms = lock();
+        transforms.retain(|(len, transform)| *len != half && transform.strong_count() > 0);
+        transforms.push((half, Arc::downgrade(&made)));
+        made
     }
 }
 
@@ -561,4 +616,29 @@ fn unpack_group(z: &[Complex<f64>], half: usize, k: usize, twiddle: &[Complex<f6
         upper.1[LANES - 1 - i] = t_im - even_im;
     }
     (lower, upper)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(n_samples: usize, window: Window) -> Spectrum {
+        let (data_decimation, frequency_decimation) = (1, 1);
+        let (detrend, band_hz, rate_hz) = (Detrend::None, None, 1.0);
+        let config =
+            SpectrumConfig { n_samples, rate_hz, data_decimation, frequency_decimation, window, detrend, band_hz };
+        Spectrum::new(config).unwrap()
+    }
+
+    #[test]
+    fn plans_of_one_length_share_their_tables_while_one_is_in_use() {
+        // A length of which no other test makes plans.
+        let first = plan(50_000, Window::Boxcar);
+        let second = plan(40_000, Window::Hann);
+        assert!(Arc::ptr_eq(&first.transform, &second.transform));
+        assert!(!Arc::ptr_eq(&first.transform, &plan(20_000, Window::Boxcar).transform));
+        let left = Arc::downgrade(&first.transform);
+        drop((first, second));
+        assert!(left.upgrade().is_none());
+    }
 }

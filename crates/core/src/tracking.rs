@@ -1,6 +1,7 @@
 //! Eqs 6 to 12: one complex number for the whole record.
 
 use std::f64::consts::PI;
+use std::sync::OnceLock;
 
 use num_complex::Complex;
 
@@ -10,7 +11,7 @@ use crate::error::{Error, Result, Signal};
 use crate::lag::View;
 use crate::pair::{Pair, check_rate, peak};
 use crate::reason::Reason;
-use crate::spectrum::{Bins, LANES, Sink, Spectrum, SpectrumConfig, SpectrumState};
+use crate::spectrum::{Bins, LANES, Layout, Sink, Spectrum, SpectrumConfig, SpectrumState};
 use crate::window::{Detrend, Window};
 
 /// Highest weight power taken.
@@ -84,6 +85,9 @@ pub struct EvaluatorConfig {
     /// Largest delay or lead looked for by the estimators that shift the target, in seconds; where the record does not go on beyond
     /// what is judged, a quarter of that at most.
     pub max_delay_s: f64,
+    /// Of delays that fit equally well (turns of a motion that is one tone, or nearly), the estimators that shift the target take
+    /// the one nearest to this, in seconds; without it the answer is "ambiguous".
+    pub expected_delay_s: Option<f64>,
     /// What least squares takes the noise on measured for.
     pub noise: Noise,
     /// Standard deviation of the noise on target over that on measured; above zero, least squares is total least squares.
@@ -102,6 +106,7 @@ impl Default for EvaluatorConfig {
             detrend: Detrend::None,
             band_hz: None,
             max_delay_s: 0.25,
+            expected_delay_s: None,
             noise: Noise::White,
             noise_ratio: 0.0,
         }
@@ -118,6 +123,7 @@ impl EvaluatorConfig {
             let expected = "a positive duration in seconds".to_owned();
             return Err(Error::Setting { name: "max_delay_s", expected, found: self.max_delay_s });
         }
+        check_expected_delay(self.expected_delay_s, self.max_delay_s)?;
         if !(self.noise_ratio.is_finite() && self.noise_ratio >= 0.0) {
             let expected = "zero or a positive number".to_owned();
             return Err(Error::Setting { name: "noise_ratio", expected, found: self.noise_ratio });
@@ -126,6 +132,11 @@ impl EvaluatorConfig {
         let needs = |name, value: &str, needed: &str| {
             Err(Error::Combination { name, value: value.to_owned(), needed: needed.to_owned() })
         };
+        if let Some(expected) = self.expected_delay_s
+            && self.estimator == Estimator::Fei
+        {
+            return needs("expected_delay_s", &expected.to_string(), "estimator aligned or least_squares");
+        }
         if self.noise_ratio > 0.0 && !least_squares {
             return needs("noise_ratio", &self.noise_ratio.to_string(), "estimator least_squares");
         }
@@ -142,6 +153,17 @@ impl EvaluatorConfig {
             return needs("decimator", "chebyshev", "estimator fei");
         }
         Ok(())
+    }
+}
+
+/// Refuses a delay that is not looked for.
+pub(crate) fn check_expected_delay(expected_delay_s: Option<f64>, max_delay_s: f64) -> Result<()> {
+    match expected_delay_s {
+        Some(found) if found.is_nan() || found.abs() > max_delay_s => {
+            let expected = format!("at most max_delay_s, {max_delay_s} s, either way");
+            Err(Error::Setting { name: "expected_delay_s", expected, found })
+        }
+        _ => Ok(()),
     }
 }
 
@@ -239,9 +261,27 @@ pub struct Evaluator {
     n_samples: usize,
     rate_hz: f64,
     chebyshev: Option<Chebyshev>,
+    layout: Layout,
+    /// The published evaluation: planned with the rest for `fei`, when its spectra are asked for otherwise.
+    published: OnceLock<Published>,
+    alignment: Option<Alignment>,
+}
+
+/// From samples to bins, and what makes good their droop.
+struct Published {
     spectrum: Spectrum,
     correction: Option<Vec<f64>>,
-    alignment: Option<Alignment>,
+}
+
+impl Published {
+    fn new(layout: Layout) -> Self {
+        let spectrum = Spectrum::of(layout);
+        Self { correction: spectrum.correction(), spectrum }
+    }
+
+    fn sums(&self, weight_power: u32, state: &SpectrumState) -> Sums {
+        weigh(&self.spectrum, self.correction.as_deref(), weight_power, state.pair())
+    }
 }
 
 /// What changes during an evaluation: its buffers. Make one a thread.
@@ -277,7 +317,7 @@ impl Evaluator {
             Some(c) => (c.out_len(n_samples), rate_hz / config.data_decimation as f64, 1),
             None => (n_samples, rate_hz, config.data_decimation),
         };
-        let spectrum = Spectrum::new(SpectrumConfig {
+        let layout = Layout::new(SpectrumConfig {
             n_samples: len,
             rate_hz: rate,
             data_decimation,
@@ -294,12 +334,11 @@ impl Evaluator {
             }
             other => other,
         })?;
-        let correction = spectrum.correction();
-        let alignment = match config.estimator {
-            Estimator::Fei => None,
-            _ => Some(Alignment::new(n_samples, rate_hz, &config)?),
+        let (alignment, published) = match config.estimator {
+            Estimator::Fei => (None, OnceLock::from(Published::new(layout))),
+            _ => (Some(Alignment::new(n_samples, rate_hz, &config)?), OnceLock::new()),
         };
-        Ok(Self { config, n_samples, rate_hz, chebyshev, spectrum, correction, alignment })
+        Ok(Self { config, n_samples, rate_hz, chebyshev, layout, published, alignment })
     }
 
     /// The settings.
@@ -319,25 +358,38 @@ impl Evaluator {
 
     /// Number of frequency bins kept.
     pub fn n_bins(&self) -> usize {
-        self.spectrum.n_bins()
+        self.layout.n_bins()
     }
 
     /// Spacing of the kept bins, Q rate / n, in hertz (Eq 9).
     pub fn delta_f_hz(&self) -> f64 {
-        self.spectrum.delta_f_hz()
+        self.layout.delta_f_hz()
     }
 
     /// Buffers for [`Evaluator::evaluate`].
     pub fn state(&self) -> EvaluatorState {
+        match &self.alignment {
+            None => self.published_state(),
+            Some(alignment) => EvaluatorState {
+                spectrum: SpectrumState::default(),
+                decimated: Default::default(),
+                filter: Vec::new(),
+                alignment: Some(alignment.state()),
+            },
+        }
+    }
+
+    /// Buffers for the published evaluation.
+    fn published_state(&self) -> EvaluatorState {
         let (decimated, filter) = match &self.chebyshev {
             Some(c) => (c.out_len(self.n_samples), c.scratch_len(self.n_samples)),
             None => (0, 0),
         };
         EvaluatorState {
-            spectrum: self.spectrum.state(),
+            spectrum: self.spectrum().state(),
             decimated: [vec![0.0; decimated], vec![0.0; decimated]],
             filter: vec![0.0; filter],
-            alignment: self.alignment.as_ref().map(Alignment::state),
+            alignment: None,
         }
     }
 
@@ -349,9 +401,14 @@ impl Evaluator {
         if let (Some(alignment), Some(state)) = (&self.alignment, &mut state.alignment) {
             self.check(pair)?;
             pair.check_fourth_powers()?;
-            return Ok(alignment.estimate(state, &View::whole(pair), 0, None));
+            return Ok(alignment.estimate(state, &View::whole(pair), 0, self.expected()));
         }
         self.published(state, pair)
+    }
+
+    /// The delay that is expected, in samples.
+    fn expected(&self) -> Option<f64> {
+        self.config.expected_delay_s.map(|d| d * self.rate_hz)
     }
 
     /// Samples before a window that [`Evaluator::evaluate_last`] may look at.
@@ -359,18 +416,12 @@ impl Evaluator {
         self.alignment.as_ref().map_or(0, Alignment::margin)
     }
 
-    /// Evaluates the last `n_samples` of a pair; the estimators that shift the target also see what comes before them. Of delays
-    /// that fit equally well the one nearest to `expected`, in samples, is taken.
-    pub(crate) fn evaluate_last(
-        &self,
-        state: &mut EvaluatorState,
-        pair: &Pair<'_>,
-        expected: Option<f64>,
-    ) -> Result<Tracking> {
+    /// Evaluates the last `n_samples` of a pair; the estimators that shift the target also see what comes before them.
+    pub(crate) fn evaluate_last(&self, state: &mut EvaluatorState, pair: &Pair<'_>) -> Result<Tracking> {
         let start = pair.n_samples() - self.n_samples;
         if let (Some(alignment), Some(state)) = (&self.alignment, &mut state.alignment) {
             pair.check_fourth_powers()?;
-            return Ok(alignment.estimate(state, &View::whole(pair), start, expected));
+            return Ok(alignment.estimate(state, &View::whole(pair), start, self.expected()));
         }
         self.published(state, &Pair::new(&pair.target()[start..], &pair.measured()[start..], pair.rate_hz())?)
     }
@@ -378,27 +429,38 @@ impl Evaluator {
     /// Eqs 1 to 12, whatever the estimator.
     fn published(&self, state: &mut EvaluatorState, pair: &Pair<'_>) -> Result<Tracking> {
         self.transform(state, pair)?;
-        self.finish(
-            weigh(&self.spectrum, self.correction.as_deref(), self.config.weight_power, state.spectrum.pair()),
-            pair,
-        )
+        self.finish(self.plan().sums(self.config.weight_power, &state.spectrum), pair)
     }
 
-    /// The same with the bins behind it.
+    /// The same with the bins behind it, for which it allocates.
     ///
     /// # Errors
     /// Those of [`Evaluator::evaluate`].
     pub fn evaluate_with_spectra(&self, state: &mut EvaluatorState, pair: &Pair<'_>) -> Result<(Tracking, Spectra)> {
-        let published = self.published(state, pair)?;
+        if self.alignment.is_none() {
+            let tracking = self.published(state, pair)?;
+            return Ok((tracking, self.spectra(&state.spectrum)));
+        }
+        let spectra = {
+            let mut state = self.published_state();
+            self.published(&mut state, pair)?;
+            self.spectra(&state.spectrum)
+        };
+        Ok((self.evaluate(state, pair)?, spectra))
+    }
+
+    /// The bins that stand in the state.
+    fn spectra(&self, state: &SpectrumState) -> Spectra {
+        let Published { spectrum, correction } = self.plan();
         let n = self.n_bins();
         let mut collected = Collect {
-            first: self.spectrum.first(),
+            first: spectrum.first(),
             target: vec![Complex::default(); n],
             measured: vec![Complex::default(); n],
         };
-        self.spectrum.visit(&state.spectrum, &mut collected);
+        spectrum.visit(state, &mut collected);
         let Collect { first, mut target, mut measured } = collected;
-        if let Some(correction) = &self.correction {
+        if let Some(correction) = correction {
             for (k, factor) in correction.iter().enumerate() {
                 target[k] *= factor;
                 measured[k] *= factor;
@@ -406,25 +468,24 @@ impl Evaluator {
         }
         let magnitudes: Vec<f64> = target.iter().map(|x| weight(x.norm_sqr(), self.config.weight_power)).collect();
         let total: f64 = magnitudes.iter().sum();
-        let spectra = Spectra {
+        Spectra {
             frequency_hz: (0..n).map(|k| (first + k) as f64 * self.delta_f_hz()).collect(),
             weights: magnitudes.iter().map(|m| m / total).collect(),
             target,
             measured,
-        };
-        let tracking = if self.alignment.is_some() { self.evaluate(state, pair)? } else { published };
-        Ok((tracking, spectra))
+        }
     }
 
     /// From now on only `bins` count; returns what makes good the droop of the cascade at each of them.
     pub(crate) fn keep_only(&mut self, bins: &[usize]) -> Vec<f64> {
-        let first = self.spectrum.first();
-        let factors: Vec<f64> = bins.iter().map(|b| self.correction.as_ref().map_or(1.0, |c| c[b - first])).collect();
+        let Published { spectrum, correction } = self.published.take().unwrap_or_else(|| Published::new(self.layout));
+        let first = spectrum.first();
+        let factors: Vec<f64> = bins.iter().map(|b| correction.as_ref().map_or(1.0, |c| c[b - first])).collect();
         let mut kept = vec![0.0; self.n_bins()];
         for (b, factor) in bins.iter().zip(&factors) {
             kept[b - first] = *factor;
         }
-        self.correction = Some(kept);
+        self.published = OnceLock::from(Published { spectrum, correction: Some(kept) });
         factors
     }
 
@@ -448,7 +509,7 @@ impl Evaluator {
             }
             None => (pair.target(), pair.measured()),
         };
-        self.spectrum.transform(spectrum, target, measured);
+        self.spectrum().transform(spectrum, target, measured);
         Ok(())
     }
 
@@ -480,12 +541,16 @@ impl Evaluator {
 
     /// Energy below which bins hold only the round-off of the others.
     pub(crate) fn round_off(&self, pair: &Pair<'_>) -> f64 {
-        self.spectrum.fft_len() as f64 * energy_at_least(pair.target()) * ROUND_OFF_SHARE
+        self.layout.fft_len() as f64 * energy_at_least(pair.target()) * ROUND_OFF_SHARE
     }
 
     /// The plan of the bins.
     pub(crate) fn spectrum(&self) -> &Spectrum {
-        &self.spectrum
+        &self.plan().spectrum
+    }
+
+    fn plan(&self) -> &Published {
+        self.published.get_or_init(|| Published::new(self.layout))
     }
 }
 
@@ -717,7 +782,8 @@ pub(crate) struct Moving<'a> {
     state: EvaluatorState,
     pair: &'a Pair<'a>,
     streams: Option<[Stream; 2]>,
-    /// Delay of the whole record in samples, which tells a window whose target is one tone which turn it is.
+    /// The delay that is expected, or else that of the whole record, in samples: it tells a window whose target is one tone
+    /// which turn it is.
     expected: Option<f64>,
 }
 
@@ -727,11 +793,14 @@ impl Evaluator {
         let streams = match (&self.chebyshev, &self.alignment) {
             (Some(_), _) | (_, Some(_)) => None,
             _ => {
-                let stream = |samples| self.spectrum.stream(samples, hop);
+                let stream = |samples| self.spectrum().stream(samples, hop);
                 stream(pair.target()).zip(stream(pair.measured())).map(|(target, measured)| [target, measured])
             }
         };
-        let expected = self.alignment.as_ref().and_then(|_| Alignment::expected(pair, &self.config));
+        let expected = self
+            .alignment
+            .as_ref()
+            .and_then(|_| self.expected().or_else(|| Alignment::expected(pair, &self.config)));
         Moving { evaluator: self, state: self.state(), pair, streams, expected }
     }
 }
@@ -748,10 +817,36 @@ impl Moving<'_> {
         let window = Pair::new(&pair.target()[range.clone()], &pair.measured()[range], pair.rate_hz())?;
         let Some([target, measured]) = streams else { return evaluator.evaluate(state, &window) };
         let signals = [(window.target(), Some(target.from(start))), (window.measured(), Some(measured.from(start)))];
-        evaluator.spectrum.transform_with(&mut state.spectrum, signals);
-        let config = &evaluator.config;
-        let sums =
-            weigh(&evaluator.spectrum, evaluator.correction.as_deref(), config.weight_power, state.spectrum.pair());
-        evaluator.finish(sums, &window)
+        let plan = evaluator.plan();
+        plan.spectrum.transform_with(&mut state.spectrum, signals);
+        evaluator.finish(plan.sums(evaluator.config.weight_power, &state.spectrum), &window)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_published_evaluation_is_planned_and_kept_only_where_it_is_asked_for() {
+        let target: Vec<f64> = (0..4096).map(|i| (f64::from(i) * 0.05).sin() + (f64::from(i) * 0.013).cos()).collect();
+        let measured: Vec<f64> = target.iter().map(|v| 0.9 * v).collect();
+        let pair = Pair::new(&target, &measured, 1000.0).unwrap();
+        let plan = |estimator| {
+            let config = EvaluatorConfig { estimator, window: Window::Hann, ..Default::default() };
+            let evaluator = Evaluator::new(target.len(), 1000.0, config).unwrap();
+            let state = evaluator.state();
+            (evaluator, state)
+        };
+        let (fei, mut of_fei) = plan(Estimator::Fei);
+        let (_, published) = fei.evaluate_with_spectra(&mut of_fei, &pair).unwrap();
+        for estimator in [Estimator::Aligned, Estimator::LeastSquares] {
+            let (evaluator, mut state) = plan(estimator);
+            let alone = evaluator.evaluate(&mut state, &pair).unwrap();
+            assert!(evaluator.published.get().is_none() && state.spectrum.pair().iter().all(|bins| bins.is_empty()));
+            let (beside, spectra) = evaluator.evaluate_with_spectra(&mut state, &pair).unwrap();
+            assert_eq!((format!("{beside:?}"), &spectra), (format!("{alone:?}"), &published));
+            assert!(state.spectrum.pair().iter().all(|bins| bins.is_empty()));
+        }
     }
 }

@@ -83,6 +83,7 @@ fn any_finite_samples_are_answered() {
             detrend: random.pick(&Detrend::NAMES).1,
             band_hz: random.pick(&[None, None, Some((low, low + rate_hz / 8.0))]),
             max_delay_s: random.pick(&[0.25, 1e-3, 10.0]),
+            expected_delay_s: random.pick(&[None, None, Some(0.0), Some(-1e-3)]),
             noise: random.pick(&[Noise::White, Noise::White, Noise::Coloured]),
             noise_ratio: random.pick(&[0.0, 0.0, 0.0, 0.3]),
         };
@@ -132,7 +133,7 @@ fn a_monitor_takes_any_bits() {
             data_decimation: random.pick(&[1, 1, 2, 8]),
             frequency_decimation: random.pick(&[1, 1, 2]),
             max_delay_s: random.pick(&[20.0, 3.0, 1000.0]) / rate_hz,
-            expected_delay_s: random.pick(&[None, Some(0.0), Some(-1e9)]),
+            expected_delay_s: random.pick(&[None, Some(0.0), Some(-3.0 / rate_hz)]),
             minimum_amplitude: random.pick(&[0.0, 0.0, 0.5]),
             n_actuators,
         };

@@ -287,6 +287,11 @@ fn one_tone_is_ambiguous_until_the_delay_to_expect_is_told() {
     assert!((told.tracking.delay_s - 0.020).abs() < 1e-9, "{told:?}");
     let a_period_later = last(MonitorConfig { expected_delay_s: Some(0.18), ..config });
     assert!((a_period_later.tracking.delay_s - 0.020 - 1.0 / 6.0).abs() < 1e-9, "{a_period_later:?}");
+    // What judges a window knows it, too; `fei` looks for none.
+    for (estimator, expected) in [(Estimator::Aligned, Some(0.01)), (Estimator::Fei, None)] {
+        let monitor = Monitor::new(MonitorConfig { estimator, expected_delay_s: Some(0.01), ..config }).unwrap();
+        assert_eq!(monitor.evaluator().config().expected_delay_s, expected);
+    }
 }
 
 #[test]
@@ -343,7 +348,15 @@ fn settings_that_cannot_be_are_refused_with_what_they_must_be() {
             "minimum_amplitude must be zero or a positive amplitude, not -1",
         ),
         (MonitorConfig { max_delay_s: 0.0, ..config }, "max_delay_s must be a positive duration"),
-        (MonitorConfig { expected_delay_s: Some(f64::NAN), ..config }, "expected_delay_s must be a finite number"),
+        (MonitorConfig { expected_delay_s: Some(f64::NAN), ..config }, "expected_delay_s must be at most max_delay_s"),
+        (
+            MonitorConfig { expected_delay_s: Some(-0.3), ..config },
+            "expected_delay_s must be at most max_delay_s, 0.25 s, either way, not -0.3",
+        ),
+        (
+            MonitorConfig { estimator: Estimator::Aligned, expected_delay_s: Some(0.3), ..config },
+            "expected_delay_s must be at most max_delay_s, 0.25 s, either way, not 0.3",
+        ),
         (MonitorConfig { n_actuators: 0, ..config }, "n_actuators must be at least 1"),
     ] {
         let message = Monitor::new(config).map(|_| ()).unwrap_err().to_string();

@@ -56,6 +56,7 @@ pub(crate) struct Settings {
     detrend: String,
     band_hz: Option<(f64, f64)>,
     max_delay_s: f64,
+    expected_delay_s: Option<f64>,
     noise: String,
     noise_ratio: f64,
 }
@@ -73,6 +74,7 @@ impl Settings {
             detrend: choice(py, "detrend", &Detrend::NAMES, &self.detrend)?,
             band_hz: self.band_hz,
             max_delay_s: self.max_delay_s,
+            expected_delay_s: self.expected_delay_s,
             noise: choice(py, "noise", &Noise::NAMES, &self.noise)?,
             noise_ratio: self.noise_ratio,
         })

@@ -35,13 +35,17 @@ def add_signals(parser: argparse.ArgumentParser, title: str) -> argparse._Argume
     return signals
 
 
-def add_method(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
-    """What every evaluation settles, whatever its P and Q."""
+def add_method(parser: argparse.ArgumentParser, *, trusted: bool = False) -> argparse._ArgumentGroup:
+    """What every evaluation settles, whatever its P and Q; `trusted`: the trusted estimate is made beside it."""
+    of_trusted = ", and so does the trusted estimate" if trusted else ""
     method = parser.add_argument_group("evaluation")
     method.add_argument("--estimator", choices=ESTIMATORS, default="fei", metavar="E",
                         help="fei (default, as published), aligned or least_squares")  # fmt: skip
     method.add_argument("--max-delay", type=positive, default=Settings().max_delay_s, metavar="S",
                         help="largest delay or lead looked for by all estimators but fei (%(default)s s)")  # fmt: skip
+    method.add_argument("--expected-delay", type=number, metavar="S",
+                        help="of delays that fit equally well, the target being one tone, the same take the one "
+                        f"nearest to this{of_trusted}; 0: nearest to none")  # fmt: skip
     method.add_argument("--noise", choices=("white", "coloured"), default="white", metavar="N",
                         help="noise on measured, for least_squares: white (default) or coloured")  # fmt: skip
     method.add_argument("--noise-ratio", type=not_negative, default=0.0, metavar="X",
@@ -52,6 +56,13 @@ def add_method(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
                         help="none (default), mean or linear")  # fmt: skip
     method.add_argument("--band", nargs=2, type=not_negative, metavar=("LO", "HI"), help="frequencies judged, in Hz")
     return method
+
+
+def expected_delay_mistake(expected_delay_s: float | None, max_delay_s: float) -> str | None:
+    """What is wrong with an expected delay that is not looked for."""
+    if expected_delay_s is None or abs(expected_delay_s) <= max_delay_s:
+        return None
+    return f"--expected-delay: expected at most --max-delay, {max_delay_s:g} s, found {expected_delay_s:g}"
 
 
 def number(text: str) -> float:

@@ -14,8 +14,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rthstrack import display
-from rthstrack.assessment import Assessment, Limits, assess, json_ready, result_entry
-from rthstrack.cli.arguments import add_method, add_signals, factor, path, positive, tolerance, weight_power
+from rthstrack.assessment import Assessment, Limits, assess, json_ready, result_entry, without_trusted
+from rthstrack.cli.arguments import (
+    add_method,
+    add_signals,
+    expected_delay_mistake,
+    factor,
+    path,
+    positive,
+    tolerance,
+    weight_power,
+)
 from rthstrack.display import with_interval
 from rthstrack.errors import RecordingError, RthstrackError, SettingError, SignalError
 from rthstrack.factors import TOLERANCE
@@ -49,7 +58,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     signals = add_signals(parser, "signals (a channel is named by name, path or #index)")
     signals.add_argument("--command", action="append", metavar="C", help="what compensation sends: judged apart")
-    method = add_method(parser)
+    method = add_method(parser, trusted=True)
     method.add_argument("-P", type=factor, default=1, metavar="N", help="data decimation, a power of two, or auto")
     method.add_argument("-Q", type=factor, default=1, metavar="N", help="frequency decimation, a power of two, or auto")
     method.add_argument("--tolerance", type=tolerance, metavar="X",
@@ -196,6 +205,7 @@ def _settings(args: argparse.Namespace) -> Settings:
         detrend=args.detrend,
         band_hz=tuple(args.band) if args.band else None,
         max_delay_s=args.max_delay,
+        expected_delay_s=args.expected_delay,
         noise=args.noise,
         noise_ratio=args.noise_ratio,
     )
@@ -215,10 +225,13 @@ def _check(args: argparse.Namespace, misuse: Callable[[str], Any]) -> None:
         misuse(f"-P auto and -Q auto need --decimator spectral, found {args.decimator}")
     if chosen and args.estimator != "fei":
         misuse(f"-P auto and -Q auto need --estimator fei, found {args.estimator}")
+    if mistake := expected_delay_mistake(args.expected_delay, args.max_delay):
+        misuse(mistake)
     try:
         # Whether P, Q and band leave anything depends on the record; whether they go together does not.
         few = min(args.P or 1, 2)
-        settings = dataclasses.replace(_settings(args), data_decimation=few, frequency_decimation=1, band_hz=None)
+        settings = without_trusted(_settings(args))
+        settings = dataclasses.replace(settings, data_decimation=few, frequency_decimation=1, band_hz=None)
         Evaluator(1024, 1.0, settings)
     except SettingError as error:
         misuse(str(error))

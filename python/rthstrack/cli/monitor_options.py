@@ -10,7 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rthstrack.cli import addresses
-from rthstrack.cli.arguments import ESTIMATORS, count, not_negative, number, positive, power_of_two
+from rthstrack.cli.arguments import (
+    ESTIMATORS,
+    count,
+    expected_delay_mistake,
+    not_negative,
+    number,
+    positive,
+    power_of_two,
+)
 from rthstrack.errors import ConfigurationError, SettingError
 from rthstrack.live import printable
 from rthstrack.live.layout import default_layout, layout_from, read_layout
@@ -314,10 +322,8 @@ def _monitor(args: argparse.Namespace, n_actuators: int, mistakes: list[str]) ->
                 f"about {size / 2**20:.0f} MiB, expected at most {most / 2**20:.0f} MiB; take a shorter one"
             )
     max_delay = args.max_delay or 0.25
-    if args.expected_delay is not None and abs(args.expected_delay) > max_delay:
-        mistakes.append(
-            f"--expected-delay: expected at most --max-delay, {max_delay:g} s, found {args.expected_delay:g}"
-        )
+    if mistake := expected_delay_mistake(args.expected_delay, max_delay):
+        mistakes.append(mistake)
     return {
         "rate_hz": rate,
         "window_s": window,

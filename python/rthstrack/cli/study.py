@@ -14,7 +14,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rthstrack.assessment import json_ready
-from rthstrack.cli.arguments import add_method, add_signals, count, number, positive, tolerance
+from rthstrack.cli.arguments import (
+    add_method,
+    add_signals,
+    count,
+    expected_delay_mistake,
+    number,
+    positive,
+    tolerance,
+)
 from rthstrack.errors import RthstrackError, SettingError
 from rthstrack.factors import TOLERANCE
 from rthstrack.studies import (
@@ -125,6 +133,8 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
         misuse("--resample interpolates the file's time stamps and excludes --rate")
     if args.start is not None and args.end is not None and args.start >= args.end:
         misuse(f"--start must come before --end, found {args.start:g} and {args.end:g}")
+    if mistake := expected_delay_mistake(args.expected_delay, args.max_delay):
+        misuse(mistake)
     if args.no_figures and args.output is None:
         misuse("--no-figures speaks of what -o DIR writes: give -o DIR")
     p, q = _grid_list(args.P), _grid_list(args.Q)
@@ -146,6 +156,7 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
         args.tolerance or TOLERANCE,
         () if args.share is None else _several("share", _items(args.share)),
         args.max_delay,
+        args.expected_delay,
         args.noise,
         args.noise_ratio,
     ).checked()
