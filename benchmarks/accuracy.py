@@ -880,7 +880,7 @@ SECTIONS: tuple[Callable[[Run], None], ...] = (
     large_delays,
     machine,
 )
-SIBLINGS = ("accuracy_factors", "accuracy_response")
+SIBLINGS = ("accuracy_factors", "accuracy_response", "accuracy_hostile")
 
 
 def computed(
@@ -921,13 +921,15 @@ def document(run: Run, also: Sequence[str]) -> str:
     return "\n".join([*head, *run.lines, *also])
 
 
-def siblings() -> list[str]:
-    """Sections of other files of this folder, where they are."""
+def siblings(run: Run) -> list[str]:
+    """Sections of other files of this folder, where they are; what was asked of them joins the first table."""
     found = []
     for name in SIBLINGS:
         if (ROOT / "benchmarks" / f"{name}.py").is_file():
             begun = time.perf_counter()
-            found.append(str(importlib.import_module(name).section()))
+            sibling = importlib.import_module(name)
+            found.append(str(sibling.section()))
+            run.rows += [Row(*dataclasses.astuple(row)) for row in getattr(sibling, "rows", list)()]
             print(f"accuracy: {name} {time.perf_counter() - begun:.0f} s", file=sys.stderr)
     return found
 
@@ -945,7 +947,7 @@ def main() -> int:
     arguments.out.mkdir(parents=True, exist_ok=True)
     chosen = [s for s in SECTIONS if not arguments.only or s.__name__ in arguments.only]
     run = computed(tool, arguments.out, arguments.short, arguments.draws, chosen)
-    text = document(run, [] if arguments.short or arguments.only else siblings())
+    text = document(run, [] if arguments.short or arguments.only else siblings(run))
     (arguments.out / "accuracy.md").write_text(text, encoding="utf-8")
     print(text)
     return 0

@@ -20,7 +20,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +45,10 @@ DELAYS_S = (0.012, -0.020, 0.040, 0.0043, -0.0071, 0.0257)
 RASH, NEEDLESS = 5.0, 20.0
 #: With a delay to expect, windows whose target has this share of the record's deviation must be determined.
 HEARD = 0.3
+#: Windows are looked at where the target has this share of the record's deviation.
+LEAST_STD = 0.05
 WINDOWS_S = (1.0, 2.0, 4.0)
+FOUR_SECONDS = ("4 s: bias/sd", "cover", "none, %")
 FRACTIONS = np.linspace(0.0, 1.0, 11)
 WHOLE = "whole"
 
@@ -60,18 +63,20 @@ class Size:
     hop_s: float = 0.25
     margins: int = 6  # readings of a record and place whose likelihoods are compared
     both_shares: Sequence[float] = (0.001, 0.003, 0.01, 0.03)
+    bits: Sequence[int] = (10, 12, 16)
     both_draws: int = 1000
     rates_hz: Sequence[float] = (512.0, 1024.0, 2048.0, 4096.0)
     assess_draws: int = 20
     varying_draws: int = 1000
     small_draws: int = 200
+    motions: int = 4  # of those that are no tones
     rounds: int = 301
 
 
 QUICK = Size(
     frequencies=(5.0, 10.0, 12.5, 14.0, 17.0, 20.0, 30.0),
     shares=(0.01, 0.1),
-    tone_draws=3,
+    tone_draws=6,
     hop_s=0.5,
     margins=2,
     both_draws=44,
@@ -89,11 +94,13 @@ SHORT = replace(
     hop_s=1.0,
     margins=1,
     both_shares=(0.003,),
-    both_draws=33,
+    bits=(10,),
+    both_draws=44,
     rates_hz=(1024.0,),
     assess_draws=1,
     varying_draws=16,
     small_draws=6,
+    motions=2,
     rounds=15,
 )
 
@@ -191,10 +198,10 @@ def tone_readings(target: Floats, measured: Floats, size: Size, expected_s: floa
             **TRUSTED,
         )
         length, hop = round(window_s * RATE_HZ), round(size.hop_s * RATE_HZ)
-        for i in np.flatnonzero(moving.valid | np.array(["ambiguous" in r for r in moving.reason])):
-            first = int(i) * hop
-            place = f"{window_s:g} s"
-            yield Reading(place, first, first + length, float(moving.delay_s[i]), str(moving.reason[i]))
+        for i, (delay_s, reason) in enumerate(zip(moving.delay_s, moving.reason, strict=True)):
+            first = i * hop
+            if np.std(target[first : first + length]) >= LEAST_STD * np.std(target):
+                yield Reading(f"{window_s:g} s", first, first + length, float(delay_s), str(reason))
     for factor in (1, 8):
         monitor = rthstrack.Monitor(
             RATE_HZ,
@@ -212,11 +219,12 @@ def tone_readings(target: Floats, measured: Floats, size: Size, expected_s: floa
 
 
 def judged_tone(
-    period_s: float, motion: Motion, colour: str, share: float, turns: hostile.Turns, size: Size, seed: int, i: int
+    period_s: float, motion: Motion, colour: str, turns: hostile.Turns, size: Size, seed: int, i: int
 ) -> Counter[tuple[str, str]]:
-    """Counts, by place, of what was read of one noisy record of one delay."""
+    """Counts, by place, of what was read of one noisy record; draw after draw, every delay meets every noise."""
     rng = np.random.Generator(np.random.PCG64([seed, i]))
-    delay_s = DELAYS_S[i % len(DELAYS_S)]
+    share = size.shares[i % len(size.shares)]
+    delay_s = DELAYS_S[(i // len(size.shares) + seed) % len(DELAYS_S)]
     target, clean = motion.samples(RATE_HZ), GAIN * motion.samples(RATE_HZ, delay_s)
     std = share * float(np.std(clean))
     measured = clean + std * unit_noise(rng, clean.shape, COLOURS[colour])
@@ -233,11 +241,11 @@ def judged_tone(
         of_interest = ambiguous or (determined and (place == WHOLE or "monitor" in place))
         if of_interest and compared[place, ambiguous] < size.margins:
             compared[place, ambiguous] += 1
-            margin = turns.margin(measured, std, reading.first, reading.last)
+            _, margin = turns.best(measured, std, reading.first, reading.last)
             found[place, "needless"] += ambiguous and margin > NEEDLESS
             found[place, "rash"] += determined and margin < RASH
-    # Half of the draws expect the very limit of what may be expected.
-    reach = float(rng.choice([-0.4, 0.4])) if i % 2 else float(rng.uniform(-0.4, 0.4))
+    # Some expect the very limit of what may be expected.
+    reach = float(rng.choice([-0.4, 0.4])) if rng.integers(2) else float(rng.uniform(-0.4, 0.4))
     for reading in tone_readings(target, measured, size, delay_s + reach * period_s):
         place, determined = reading.place, np.isfinite(reading.delay_s)
         heard = np.std(target[reading.first : reading.last]) >= HEARD * np.std(target)
@@ -257,29 +265,28 @@ def tones(bench: Bench) -> None:
         "### Tones and narrow bands",
         "",
         f"Gain {GAIN:g}, {RATE_HZ:g} Hz, delays of -20 to +40 ms, noise of {percent(min(size.shares))} to"
-        f" {percent(max(size.shares))} % of measured's deviation, white and AR(0.9). Cells: readings, of which wrong by"
-        " more than a quarter of a period, ambiguous / of those looked at needlessly (log-likelihoods of the turns with"
-        f" the noise's own spectrum over {NEEDLESS:g} apart), rash (determined below {RASH:g}; not of moving windows, which lean"
-        " on the whole record), not determined for another reason; with a delay to expect within 0.4 of a period of the"
-        f" truth: wrong, not determined (where the target has {HEARD:g} of the record's deviation).",
+        f" {percent(max(size.shares))} % of measured's deviation, white and AR(0.9), {size.tone_draws} draws of each."
+        " Cells: readings; of them wrong by more than a quarter of a period; ambiguous / needlessly so (the turns'"
+        f" log-likelihoods, with the noise's own spectrum, more than {NEEDLESS:g} apart; up to {size.margins} of a"
+        f" record looked at); rash (determined, though less than {RASH:g} apart; not of moving windows, which lean on"
+        " the whole record); not determined for another reason. After the semicolon, with a delay to expect within 0.4"
+        f" of a period of the truth: wrong; not determined though the target has {HEARD:g} of the record's deviation.",
     )
     bench.head("case", *PLACES)
     total: Counter[tuple[str, str]] = Counter()
     for number, (_, f, motion) in enumerate(tone_motions(size)):
         case: Counter[tuple[str, str]] = Counter()
         for c, colour in enumerate(COLOURS):
-            turns = hostile.Turns(motion, RATE_HZ, COLOURS[colour])
-            for s, share in enumerate(size.shares):
-                seed = 10_000 + 100 * number + 10 * s + c
+            turns, seed = hostile.Turns(motion, RATE_HZ, COLOURS[colour]), 10_000 + 3 * number + c
 
-                def judge(i: int, colour: str = colour, share: float = share, turns: Any = turns, seed: int = seed,
-                          motion: Motion = motion, f: float = f) -> Counter[tuple[str, str]]:  # fmt: skip
-                    return judged_tone(1 / f, motion, colour, share, turns, size, seed, i)
+            def judge(
+                i: int, colour: str = colour, turns: hostile.Turns = turns, seed: int = seed, motion: Motion = motion,
+                period_s: float = 1 / f,
+            ) -> Counter[tuple[str, str]]:  # fmt: skip
+                return judged_tone(period_s, motion, colour, turns, size, seed, i)
 
-                # The delays of one case go on where those of the one before ended.
-                draws = range(3 * (number + s + c), 3 * (number + s + c) + size.tone_draws)
-                for one in bench.pool.map(judge, draws):
-                    case.update(one)
+            for one in bench.pool.map(judge, range(size.tone_draws)):
+                case.update(one)
         total.update(case)
         bench.case(motion.name, *(_tone_cell(case, place) for place in PLACES))
     bench.say()
@@ -357,21 +364,51 @@ class Found:
     @property
     def withheld(self) -> float:
         """Share of readings without an interval of the delay."""
-        return float(np.mean(np.isnan(self.delay_interval_s[..., 0])))
+        missing = np.isnan(self.delay_interval_s[..., 0])
+        return float(missing.mean()) if missing.size else np.nan
 
-    def cover(self, gain: float, delay_s: Floats | float) -> tuple[float, float]:
-        """Shares of the intervals that hold the truth, of gain and delay; NaN where there is none."""
-        shares = []
-        for interval, truth in ((self.gain_interval, gain), (self.delay_interval_s, delay_s)):
+    def cover(self, gain: float, delay_s: Floats | float, case: str = "") -> tuple[Cover, Cover]:
+        """Of delay and gain."""
+        covers = []
+        for interval, truth in ((self.delay_interval_s, delay_s), (self.gain_interval, gain)):
             there = np.isfinite(interval[..., 0])
             inside = (interval[..., 0] <= truth) & (truth <= interval[..., 1])
-            shares.append(float(inside[there].mean()) if there.any() else np.nan)
-        return shares[0], shares[1]
+            n = int(there.sum())
+            covers.append(Cover(float(inside[there].mean()) if n else np.nan, n, case))
+        return covers[0], covers[1]
 
 
-def near_95(share: float, n: int, most: float = 0.97) -> bool:
-    """93 to 97 %."""
-    return bool(0.93 <= share <= most)
+@dataclass(frozen=True)
+class Cover:
+    """Share of intervals that hold the truth in one case, and of how many."""
+
+    share: float
+    n: int
+    case: str
+
+    @property
+    def near(self) -> bool:
+        """93 to 97 %; of few draws, within three standard deviations of 95 %. True where there is none to judge."""
+        return self.n == 0 or bool(abs(self.share - 0.95) <= max(0.02, 3 * np.sqrt(0.05 * 0.95 / self.n)))
+
+
+def asked_of_cover(bench: Bench, name: str, covers: Sequence[Cover]) -> None:
+    """A row: all cases together within 93 to 97 %, and each of them but for chance."""
+    known = [c for c in covers if c.n]
+    if not known:
+        bench.asked(name, "93 to 97 %", "no interval at all", False)
+        return
+    low, high = min(known, key=lambda c: c.share), max(known, key=lambda c: c.share)
+    mean = float(np.average([c.share for c in known], weights=[c.n for c in known]))
+    outside = sum(not c.near for c in known)
+    bench.asked(
+        name,
+        "93 to 97 %",
+        f"{percent(mean)} %; {outside} of {len(known)} cases outside but for chance, {percent(low.share)} ({low.case})"
+        f" to {percent(high.share)} %",
+        0.93 <= mean <= 0.97 and outside == 0,
+        mean,
+    )
 
 
 def largest_bias(z: Floats, phase: Floats) -> float:
@@ -379,6 +416,7 @@ def largest_bias(z: Floats, phase: Floats) -> float:
 
     z: (draws, windows), each column over its own deviation; phase: (draws,), fractions of a sample.
     """
+    z = z[:, np.isfinite(z).sum(axis=0) > 10]
     z = z / np.nanstd(z, axis=0)
     design = np.stack([np.ones(len(phase)), np.cos(2 * np.pi * phase), np.sin(2 * np.pi * phase)], axis=1)
     there = np.isfinite(z)
@@ -391,8 +429,10 @@ def largest_bias(z: Floats, phase: Floats) -> float:
 # Noise on both channels -----------------------------------------------------------------------------------------------
 
 
-def both_motions() -> list[Periodic]:
-    return [hostile.response("5 Hz"), hostile.response("1 Hz"), hostile.chirp(), hostile.broad()]
+def motions(size: Size) -> list[Periodic]:
+    """Responses to an earthquake, a broad band, a sweep."""
+    made = (partial(hostile.response, "5 Hz"), partial(hostile.response, "1 Hz"), hostile.broad, hostile.chirp)
+    return [make() for make in made[: size.motions]]
 
 
 def _both_pair(
@@ -404,7 +444,8 @@ def _both_pair(
     target = motion.samples(rate_hz, start_s)
     measured = GAIN * motion.samples(rate_hz, start_s + delay_s)
     if isinstance(dirt, int):
-        scale = 1.25 * float(np.max(np.abs(target)))
+        # Of one amplitude, or one place between two samples, rounding would make the same error in every draw.
+        scale = float(rng.uniform(1.1, 1.5)) * float(np.max(np.abs(target)))
         return hostile.quantised(target, dirt, scale), hostile.quantised(measured, dirt, scale), delay_s
     noise = unit_noise(rng, (2, len(target)))
     return target + dirt * np.std(target) * noise[0], measured + dirt * np.std(measured) * noise[1], delay_s
@@ -416,114 +457,126 @@ def both(bench: Bench) -> None:
     bench.say(
         "### The same noise on target and measured",
         "",
-        "White, of a share of each channel's deviation, or both channels rounded to so many bits of 2.5 times the"
-        f" target's peak; delays of 7 to 8 samples, eleven fractions; {size.both_draws} draws a motion, noise and rate;"
-        " 30 s. Bias over sd: of the delay and the gain, the largest over the fraction of a sample of a sine fitted to"
-        " the draws. Cover of delay and gain; share without an interval. Sentence: how often `assess` says to use the"
-        " trusted estimate where it was the worse one (rms over the draws), of how many times it says so.",
+        "White, of a share of each channel's deviation, or both channels rounded to so many bits of 2.2 to 3 times"
+        f" the target's peak; delays of 7 to 8 samples, eleven fractions; {size.both_draws} draws a motion, noise and"
+        " rate; 30 s. Bias over sd: of the delay and the gain, the largest over the fraction of a sample of a sine"
+        " fitted to the draws. Cover of delay and gain; share without an interval.",
     )
     bench.head(
-        "case", "rms error, us", "bias/sd, d, A", "cover, d, A, %", "none, %", "4 s: bias/sd", "cover", "none, %"
+        "case",
+        "rms error, plain FEI's, us",
+        "bias/sd, d, A",
+        "cover, d, A, %",
+        "none, %",
+        "4 s: bias/sd",
+        "cover",
+        "none, %",
     )
-    dirts: list[float | int] = [*size.both_shares, 10, 12, 16]
-    covers: dict[str, list[float]] = {"noise": [], "bits": []}
-    biases: dict[str, list[float]] = {"noise": [], "bits": []}
+    dirts: list[float | int] = [*size.both_shares, *size.bits]
+    covers: dict[bool, list[Cover]] = {False: [], True: []}
+    biases: dict[bool, list[float]] = {False: [], True: []}
     withheld: list[float] = []
-    for m, motion in enumerate(both_motions()):
+    rms: dict[tuple[str, float], Floats] = {}
+    for m, motion in enumerate(motions(size)):
         for (r, rate_hz), (d, dirt) in itertools.product(enumerate(size.rates_hz), enumerate(dirts)):
             judge = _both_judge(motion, rate_hz, dirt)
             draws = bench.repeat(20_000 + 1000 * m + 100 * r + d, size.both_draws, judge)
             whole, moving = Found.of(x[0] for x in draws), Found.of(x[1] for x in draws)
-            moving = moving.taking(draws[0][2])
-            truth = np.array([x[3] for x in draws])[:, None]
-            phase = truth[:, 0] * rate_hz
-            cells, kind = [], "bits" if isinstance(dirt, int) else "noise"
-            for found in (whole, moving):
-                error_d, error_g = found.delay_s - truth, found.gain - GAIN
-                bias = [largest_bias(e, phase) for e in (error_d, error_g)]
-                cover = found.cover(GAIN, truth)[::-1]
-                biases[kind] += bias
-                covers[kind] += cover
-                if kind == "noise" and dirt <= 0.01:
+            moving = moving.taking(_strong(motion, rate_hz, 4.0))
+            truth = np.array([x[2] for x in draws])[:, None]
+            bits = isinstance(dirt, int)
+            label = f"{motion.name}, {rate_hz:g} Hz, {_dirt(dirt)}"
+            cells = []
+            for found, where in ((whole, WHOLE), (moving, "4 s")):
+                bias = [largest_bias(e, truth[:, 0] * rate_hz) for e in (found.delay_s - truth, found.gain - GAIN)]
+                cover = found.cover(GAIN, truth, f"{label}, {where}")
+                biases[bits] += bias
+                covers[bits] += cover
+                if not bits and dirt <= 0.01:
                     withheld.append(found.withheld)
-                cells += [f"{bias[0]:.2f}, {bias[1]:.2f}", ", ".join(map(percent, cover)), percent(found.withheld)]
-            rms = 1e6 * float(np.sqrt(np.nanmean((whole.delay_s - truth) ** 2)))
-            label = f"{dirt} bit" if isinstance(dirt, int) else f"{percent(dirt)} %"
-            bench.case(f"{motion.name}, {rate_hz:g} Hz, {label}", f"{rms:.3g}", *cells)
+                cells += [_listed(f"{b:.2f}" for b in bias), _listed(percent(c.share) for c in cover),
+                          percent(found.withheld)]  # fmt: skip
+            errors = np.stack([whole.gain - GAIN, whole.delay_s - truth], axis=-1)[:, 0]
+            plain = np.array([x[3] for x in draws]) - np.column_stack([np.full(len(truth), GAIN), truth])
+            spread = np.sqrt(np.nanmean(np.stack([errors, plain]) ** 2, axis=1))
+            if rate_hz == RATE_HZ:
+                rms[motion.name, dirt] = spread
+            bench.case(label, f"{1e6 * spread[0, 1]:.3g}, {1e6 * spread[1, 1]:.3g}", *cells)
     bench.say()
-    for kind, name in (("noise", f"noise of {percent(min(size.both_shares))} to {percent(max(size.both_shares))} %"),
-                       ("bits", "10, 12, 16 bit")):  # fmt: skip
-        values = np.array(covers[kind])
-        bias = max(np.nan_to_num(biases[kind], nan=np.inf))
-        chance = np.sqrt(3 / size.both_draws)
+    # Of draws without any bias, the largest fitted value is about 3 over their root, and at most twice that.
+    chance = 3 / np.sqrt(size.both_draws)
+    for bits, name in ((False, f"noise of {percent(min(size.both_shares))} to {percent(max(size.both_shares))} %"),
+                       (True, f"{_listed(map(str, size.bits))} bit")):  # fmt: skip
+        worst = max(biases[bits])
         bench.asked(
             f"both channels, {name}: bias over sd of delay and gain, worst case",
             "<= 0.2",
-            f"{bias:.2f} (chance alone: {chance:.2f})",
-            bias <= 0.2,
-            bias,
+            f"{worst:.2f} (by chance alone about {chance:.2f})",
+            worst <= max(0.2, 2 * chance),
+            worst,
         )
-        low, high = np.nanmin(values), np.nanmax(values)
-        bench.asked(
-            f"both channels, {name}: cover of delay and gain",
-            "93 to 97 %",
-            f"{percent(low)} to {percent(high)} %, all {percent(np.nanmean(values))} %",
-            bool(low >= 0.93 and high <= 0.97),
-            float(np.nanmean(values)),
-        )
-    if withheld:
-        bench.asked("both channels, up to 1 %: no interval, worst case", "<= 5 %", f"{percent(max(withheld))} %",
-                    max(withheld) <= 0.05, max(withheld))  # fmt: skip
-    _sentences(bench, dirts)
+        asked_of_cover(bench, f"both channels, {name}: cover of delay and gain", covers[bits])
+    bench.asked("both channels, up to 1 %: no interval, worst case", "<= 5 %", f"{percent(max(withheld))} %",
+                max(withheld) <= 0.05, max(withheld))  # fmt: skip
+    _sentences(bench, rms)
+
+
+def _dirt(dirt: float | int) -> str:
+    return f"{dirt} bit" if isinstance(dirt, int) else f"{percent(dirt)} %"
+
+
+def _listed(values: Iterable[str]) -> str:
+    return ", ".join(values)
 
 
 def _both_judge(motion: Periodic, rate_hz: float, dirt: float | int) -> Callable[[int, np.random.Generator], Any]:
-    def judge(i: int, rng: np.random.Generator) -> tuple[Any, Any, NDArray[np.bool_], float]:
+    def judge(i: int, rng: np.random.Generator) -> tuple[Any, Any, float, tuple[float, float]]:
         target, measured, delay_s = _both_pair(motion, rate_hz, dirt, i, rng)
         whole = rthstrack.evaluate(target, measured, rate_hz, **TRUSTED)
         moving = rthstrack.evaluate_moving(target, measured, rate_hz, window_s=4.0, hop_s=4.0, **TRUSTED)
-        return whole, moving, _strong(motion, rate_hz, 4.0), delay_s
+        plain = rthstrack.evaluate(target, measured, rate_hz)
+        return whole, moving, delay_s, (float(plain.amplitude), float(plain.delay_s))
 
     return judge
 
 
-def _strong(motion: Periodic, rate_hz: float, window_s: float) -> NDArray[np.bool_]:
-    """Windows that follow each other in which the target has at least 5 % of the record's deviation."""
-    x, length = motion.samples(rate_hz), round(window_s * rate_hz)
-    stds = [np.std(x[s : s + length]) for s in range(0, len(x) - length + 1, length)]
-    return np.array(stds) >= 0.05 * np.std(x)
+def _strong(motion: Periodic, rate_hz: float, window_s: float, hop_s: float | None = None) -> NDArray[np.bool_]:
+    """Windows, by default one after the other, in which the target has at least 5 % of the record's deviation."""
+    x, length, hop = motion.samples(rate_hz), round(window_s * rate_hz), round((hop_s or window_s) * rate_hz)
+    stds = [np.std(x[s : s + length]) for s in range(0, len(x) - length + 1, hop)]
+    return np.array(stds) >= LEAST_STD * np.std(x)
 
 
-def _sentences(bench: Bench, dirts: Sequence[float | int]) -> None:
-    """What `assess` says to use, beside what was better."""
-    said = worse = 0
-    names = []
-    for (m, motion), (d, dirt) in itertools.product(enumerate(both_motions()), enumerate(dirts)):
+def _sentences(bench: Bench, rms: dict[tuple[str, float], Floats]) -> None:
+    """What `assess` says to use, beside what was better: `rms` errors of (trusted, plain), of (gain, delay)."""
+    said, worse, count = 0, Counter[str](), 0
+    for (m, motion), d in itertools.product(enumerate(motions(bench.size)), {d: None for _, d in rms}):
 
-        def judge(i: int, rng: np.random.Generator, motion: Periodic = motion, dirt: float | int = dirt) -> Any:
-            target, measured, delay_s = _both_pair(motion, RATE_HZ, dirt, 3 * i + 2, rng)
-            a = rthstrack.assess(target, measured, RATE_HZ)
-            errors = [[t.amplitude - GAIN, t.delay_s - delay_s] for t in (a.trusted, a.tracking)]
-            return errors, a.argument
+        def judge(i: int, rng: np.random.Generator, motion: Periodic = motion, dirt: float | int = d) -> str:
+            target, measured, _ = _both_pair(motion, RATE_HZ, dirt, 3 * i + 2, rng)
+            return str(rthstrack.assess(target, measured, RATE_HZ).argument)
 
-        found = bench.repeat(30_000 + 10 * m + d, bench.size.assess_draws, judge)
-        rms = np.sqrt(np.nanmean(np.array([errors for errors, _ in found]) ** 2, axis=0))
-        for _, sentence in found:
+        trusted, plain = rms[motion.name, d]
+        for sentence in bench.repeat(30_000 + m, bench.size.assess_draws, judge):
+            count += 1
             if sentence.startswith("use the trusted estimate"):
                 said += 1
+                # "... is 0.03 ms below and 1.2 % above in amplitude, ...": of what it speaks.
                 gap = sentence.split(",")[0]
-                which = [1] if "in amplitude" not in gap else [0, 1] if " ms " in gap else [0]
-                if any(rms[0, k] > rms[1, k] for k in which):
-                    worse += 1
-                    names.append(f"{motion.name} {dirt} {['A', 'd'][which[-1]]}")
-    if bench.tell and names:
-        print("   worse:", "; ".join(f"{k} x{v}" for k, v in Counter(names).items()))
+                about = {"gain": "in amplitude" in gap, "delay": " ms " in gap or "in amplitude" not in gap}
+                bad = [n for k, n in enumerate(("gain", "delay")) if about[n] and trusted[k] > plain[k]]
+                if bad:
+                    worse[
+                        f"{_listed(bad)} of {motion.name}, {f'{d} bit' if isinstance(d, int) else percent(d) + ' %'}"
+                    ] += 1
+    if bench.tell and worse:
+        print("   worse:", "; ".join(f"{name} ({n})" for name, n in worse.items()))
     bench.asked(
-        "both channels: 'use the trusted estimate' where it is the worse one",
+        "both channels: 'use the trusted estimate' where it is the worse one (rms over the draws)",
         "never",
-        f"{worse} of {said} times that it is said, of {bench.size.assess_draws * 4 * len(dirts)}",
-        worse == 0,
-        worse,
+        f"{worse.total()} of {said} times that it is said, of {count}",
+        not worse,
+        worse.total(),
     )
 
 
@@ -545,12 +598,11 @@ def varying(bench: Bench) -> None:
     )
     spans = (WHOLE, "4 s", "2 s", "1 s", "0.125 s")
     bench.head("case", *spans)
-    lows: dict[tuple[str, bool], list[tuple[float, str]]] = {}
+    covers: dict[tuple[str, bool], list[Cover]] = {}
     none: dict[tuple[str, bool], list[float]] = {}
     colours = {**COLOURS, "AR(0.99)": 0.99}
-    motions = [hostile.response("5 Hz"), hostile.response("1 Hz"), hostile.broad()]
     for (m, motion), (c, colour), (k, kind) in itertools.product(
-        enumerate(motions), enumerate(colours), enumerate(STRENGTHS)
+        enumerate(motions(size)[:3]), enumerate(colours), enumerate(STRENGTHS)
     ):
         target, clean = motion.samples(RATE_HZ), GAIN * motion.samples(RATE_HZ, VARYING_DELAY_S)
         if colour == "AR(0.99)" and kind != "stationary":
@@ -577,31 +629,23 @@ def varying(bench: Bench) -> None:
         for s, span in enumerate(spans):
             found = Found.of(x[s] for x in draws)
             if span != WHOLE:
-                found = found.taking(np.asarray(draws[0][s].valid) | np.isfinite(found.delay_s).any(axis=0))
-            gain, delay = found.cover(GAIN, VARYING_DELAY_S)
-            cells.append(f"{percent(delay)}, {percent(gain)} ({percent(found.withheld)})")
+                window_s = float(span.split()[0])
+                found = found.taking(_strong(motion, RATE_HZ, window_s, max(window_s, 0.5)))
+            cover = found.cover(GAIN, VARYING_DELAY_S, f"{colour}, {motion.name}, {span}")
+            cells.append(f"{_listed(percent(c.share) for c in cover)} ({percent(found.withheld)})")
             judged = span != "0.125 s" and (colour == "white" or (colour == "AR(0.9)" and span in (WHOLE, "4 s")))
-            lows.setdefault((kind, judged), []).extend((x, f"{colour}, {motion.name}, {span}") for x in (delay, gain))
+            covers.setdefault((kind, judged), []).extend(cover)
             none.setdefault((kind, judged), []).append(found.withheld)
         bench.case(f"{motion.name}, {colour}, {kind}", *cells)
     bench.say()
     for kind in STRENGTHS:
-        covers, withheld = lows[kind, True], max(none[kind, True])
-        low, high = min(covers), max(covers)
-        mean = float(np.nanmean([x for x, _ in covers]))
-        bench.asked(
-            f"noise on measured, {kind}: cover of delay and gain, white from 1 s, AR(0.9) from 4 s",
-            "93 to 97 %",
-            f"{percent(low[0])} ({low[1]}) to {percent(high[0])} %, all {percent(mean)} %",
-            low[0] >= 0.93 and high[0] <= 0.97,
-            mean,
-        )
-        bench.asked(f"noise on measured, {kind}: no interval, worst case", "<= 5 %", f"{percent(withheld)} %",
-                    withheld <= 0.05, withheld)  # fmt: skip
-        rest = lows[kind, False]
-        low, high = np.nanmin([x for x, _ in rest]), np.nanmax([x for x, _ in rest])
-        bench.asked(f"noise on measured, {kind}: cover, shorter coloured windows, AR(0.99), 128 samples", "reported",
-                    f"{percent(low)} to {percent(high)} %")  # fmt: skip
+        name = f"noise on measured, {kind}"
+        asked_of_cover(bench, f"{name}: cover of delay and gain, white from 1 s, AR(0.9) from 4 s", covers[kind, True])
+        withheld = max(none[kind, True])
+        bench.asked(f"{name}: no interval, worst case", "<= 5 %", f"{percent(withheld)} %", withheld <= 0.05, withheld)
+        rest = [c.share for c in covers[kind, False] if c.n]
+        bench.asked(f"{name}: cover, shorter coloured windows, AR(0.99), 128 samples", "reported",
+                    f"{percent(min(rest))} to {percent(max(rest))} %")  # fmt: skip
 
 
 # Smaller things -------------------------------------------------------------------------------------------------------
@@ -622,7 +666,7 @@ def _small_row(bench: Bench, case: str, asked: str, measured: str, met: bool | N
 
 
 def _pickup(bench: Bench) -> None:
-    for motion in (hostile.response("5 Hz"), hostile.response("1 Hz"), hostile.broad()):
+    for motion in motions(bench.size)[:3]:
         target, clean = motion.samples(RATE_HZ), GAIN * motion.samples(RATE_HZ, VARYING_DELAY_S)
         t, std = np.arange(len(target)) / RATE_HZ, float(np.std(clean))
 
@@ -635,20 +679,19 @@ def _pickup(bench: Bench) -> None:
             monitor = rthstrack.Monitor(
                 RATE_HZ, update_hz=1.0, band_hz=(0, 32), window="hann", data_decimation=8, estimator="least_squares"
             )
-            r = monitor.process(target, measured)
-            return r
+            return monitor.process(target, measured)
 
         draws = bench.repeat(50_000, bench.size.small_draws, judge)
         found = Found.of(draws)
-        strong = _strong_readings(motion, draws[0])
-        gain, delay = found.taking(strong).cover(GAIN, VARYING_DELAY_S)
+        found = found.taking(_strong_readings(motion, draws[0]))
+        delay, gain = found.cover(GAIN, VARYING_DELAY_S)
         _small_row(
             bench,
             f"Monitor, P = 8, Hann, 5 % pickup at 50 Hz, {motion.name}: cover of delay and gain",
             "93 to 97 %",
-            f"{percent(delay)}, {percent(gain)} %, none in {percent(found.taking(strong).withheld)} %",
-            near_95(delay, 0) and near_95(gain, 0),
-            delay,
+            f"{percent(delay.share)}, {percent(gain.share)} %, none in {percent(found.withheld)} %",
+            delay.near and gain.near and found.withheld <= 0.05,
+            delay.share,
         )
 
 
@@ -656,11 +699,11 @@ def _strong_readings(motion: Periodic, readings: Any) -> NDArray[np.bool_]:
     x, half = motion.samples(RATE_HZ), round(2 * RATE_HZ)
     centres = np.round(np.asarray(readings.centre_s) * RATE_HZ).astype(int)
     stds = np.array([np.std(x[max(c - half, 0) : c + half]) for c in centres])
-    return np.asarray(stds >= 0.05 * np.std(x))
+    return np.asarray(stds >= LEAST_STD * np.std(x))
 
 
 def _two_noises(bench: Bench) -> None:
-    for motion in (hostile.response("5 Hz"), hostile.response("1 Hz"), hostile.broad()):
+    for motion in motions(bench.size)[:3]:
         target, clean = motion.samples(RATE_HZ), GAIN * motion.samples(RATE_HZ, VARYING_DELAY_S)
 
         def judge(i: int, rng: np.random.Generator, target: Floats = target, clean: Floats = clean) -> Any:
@@ -668,14 +711,14 @@ def _two_noises(bench: Bench) -> None:
             return rthstrack.evaluate(target, clean + 0.01 * np.std(clean) * noise, RATE_HZ, **TRUSTED)
 
         found = Found.of(bench.repeat(51_000, 2 * bench.size.small_draws, judge))
-        gain, delay = found.cover(GAIN, VARYING_DELAY_S)
+        delay, gain = found.cover(GAIN, VARYING_DELAY_S)
         _small_row(
             bench,
             f"white and AR(0.99) at once, 1 %, {motion.name}: cover of delay and gain",
             "93 to 97 %",
-            f"{percent(delay)}, {percent(gain)} %, none in {percent(found.withheld)} %",
-            near_95(delay, 0) and near_95(gain, 0),
-            gain,
+            f"{percent(delay.share)}, {percent(gain.share)} %, none in {percent(found.withheld)} %",
+            delay.near and gain.near and found.withheld <= 0.05,
+            gain.share,
         )
 
 
@@ -706,7 +749,7 @@ def _too_high(bench: Bench) -> None:
 
 def _beyond(bench: Bench) -> None:
     wrong, total, said = 0, 0, Counter[str]()
-    for motion in both_motions():
+    for motion in motions(bench.size):
         target, clean = motion.samples(RATE_HZ), GAIN * motion.samples(RATE_HZ, 0.4)
 
         def judge(i: int, rng: np.random.Generator, target: Floats = target, clean: Floats = clean) -> str:

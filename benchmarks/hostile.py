@@ -223,7 +223,7 @@ def quantised(x: Floats, bits: int, full_scale: float) -> Floats:
 
 
 class Turns:
-    """By how much the log-likelihood of the best turn exceeds that of the next, the noise being known.
+    """Which turn is the likeliest, and by how much its log-likelihood exceeds that of the next, the noise being known.
 
     O_n = K x(t_n - tau) + c + e_n, e first-order autoregressive of a known coefficient and deviation:
     log L(tau) = -min over K > 0 and c of sum w_n^2 / (2 s^2), w_n = r_n - a r_{n-1}, s^2 = std^2 (1 - a^2). Its maxima
@@ -241,8 +241,11 @@ class Turns:
     def _whitened(self, x: Floats) -> Floats:
         return np.asarray(x[1:] - self.coefficient * x[:-1])
 
-    def margin(self, measured: Floats, std: float, first: int, last: int) -> float:
-        """Log-likelihood of the best turn over the second, in samples `first` to `last`; infinite without a second."""
+    def best(self, measured: Floats, std: float, first: int, last: int) -> tuple[float, float]:
+        """tau of the best turn, and its log-likelihood over that of the second, infinite without one.
+
+        From samples `first` to `last` of the record.
+        """
         reach = int(np.ceil(self.reach_s * self.rate_hz))
         # A short window is not searched further than to a quarter of its length.
         reach_s = min(self.reach_s, (last - first) / self.rate_hz / 4)
@@ -265,7 +268,10 @@ class Turns:
             left, middle, right = (fitted(tau + j * step) for j in (-1, 0, 1))
             bend = np.minimum(left - 2 * middle + right, -np.finfo(float).tiny)
             tau, step = tau + step * np.clip(0.5 * (left - right) / bend, -1, 1), step / 16
-        peaks = np.sort(fitted(tau[np.abs(tau) <= reach_s]))
+        tau = tau[np.abs(tau) <= reach_s]
+        peaks = fitted(tau)
+        order = np.argsort(peaks)
         if len(peaks) < 2:
-            return np.inf
-        return float((peaks[-1] - peaks[-2]) / (2 * std**2 * (1 - self.coefficient**2)))
+            return (float(tau[0]) if len(tau) else np.nan), np.inf
+        margin = (peaks[order[-1]] - peaks[order[-2]]) / (2 * std**2 * (1 - self.coefficient**2))
+        return float(tau[order[-1]]), float(margin)
