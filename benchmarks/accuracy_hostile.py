@@ -88,7 +88,7 @@ QUICK = Size(
 )
 SHORT = replace(
     QUICK,
-    frequencies=(12.5, 20.0),
+    frequencies=(20.0,),
     shares=(0.1,),
     tone_draws=2,
     hop_s=1.0,
@@ -185,7 +185,7 @@ def tone_motions(size: Size) -> Iterator[tuple[str, float, Motion]]:
 
 def tone_readings(target: Floats, measured: Floats, size: Size, expected_s: float | None) -> Iterator[Reading]:
     """Whole record, moving windows, and a monitor at P = 1 and 8."""
-    signals, n = (target, measured, RATE_HZ), len(target)
+    signals, n, least = (target, measured, RATE_HZ), len(target), LEAST_STD * np.std(target)
     whole = with_expected(rthstrack.evaluate, *signals, expected_s=expected_s, **TRUSTED)
     yield Reading(WHOLE, 0, n, float(whole.delay_s), str(whole.reason))
     for window_s in WINDOWS_S:
@@ -200,7 +200,7 @@ def tone_readings(target: Floats, measured: Floats, size: Size, expected_s: floa
         length, hop = round(window_s * RATE_HZ), round(size.hop_s * RATE_HZ)
         for i, (delay_s, reason) in enumerate(zip(moving.delay_s, moving.reason, strict=True)):
             first = i * hop
-            if np.std(target[first : first + length]) >= LEAST_STD * np.std(target):
+            if np.std(target[first : first + length]) >= least:
                 yield Reading(f"{window_s:g} s", first, first + length, float(delay_s), str(reason))
     for factor in (1, 8):
         monitor = rthstrack.Monitor(
@@ -226,7 +226,7 @@ def judged_tone(
     share = size.shares[i % len(size.shares)]
     delay_s = DELAYS_S[(i // len(size.shares) + seed) % len(DELAYS_S)]
     target, clean = motion.samples(RATE_HZ), GAIN * motion.samples(RATE_HZ, delay_s)
-    std = share * float(np.std(clean))
+    std, heard = share * float(np.std(clean)), HEARD * np.std(target)
     measured = clean + std * unit_noise(rng, clean.shape, COLOURS[colour])
     found: Counter[tuple[str, str]] = Counter()
     compared: Counter[str] = Counter()
@@ -248,10 +248,10 @@ def judged_tone(
     reach = float(rng.choice([-0.4, 0.4])) if rng.integers(2) else float(rng.uniform(-0.4, 0.4))
     for reading in tone_readings(target, measured, size, delay_s + reach * period_s):
         place, determined = reading.place, np.isfinite(reading.delay_s)
-        heard = np.std(target[reading.first : reading.last]) >= HEARD * np.std(target)
         found[place, "expected n"] += 1
         found[place, "expected wrong"] += bool(determined and abs(reading.delay_s - delay_s) > period_s / 4)
-        found[place, "expected missing"] += bool(not determined and heard)
+        if not determined:
+            found[place, "expected missing"] += bool(np.std(target[reading.first : reading.last]) >= heard)
     return found
 
 

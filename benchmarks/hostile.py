@@ -232,8 +232,8 @@ class Turns:
 
     def __init__(self, motion: Motion, rate_hz: float, coefficient: float, reach_s: float = 0.25) -> None:
         self.rate_hz, self.coefficient, self.reach_s = rate_hz, coefficient, reach_s
-        # Correlations have no more band than the motion: a spline of degree 7 through 16 points a period is exact.
-        self.step = 1 / (16 * motion.high_hz)
+        # Correlations have no more band than the motion: a spline of degree 7 through 12 points a period is exact.
+        self.step = 1 / (12 * motion.high_hz)
         count = int(np.ceil(reach_s / self.step)) + 4
         self.taus = self.step * np.arange(-count, count + 1)
         self.rows = np.stack([self._whitened(motion.samples(rate_hz, tau)) for tau in self.taus])
@@ -267,7 +267,7 @@ class Turns:
         for _ in range(3):
             left, middle, right = (fitted(tau + j * step) for j in (-1, 0, 1))
             bend = np.minimum(left - 2 * middle + right, -np.finfo(float).tiny)
-            tau, step = tau + step * np.clip(0.5 * (left - right) / bend, -1, 1), step / 16
+            tau, step = tau + step * np.clip(0.5 * (left - right) / bend, -1, 1), step / 12
         tau = tau[np.abs(tau) <= reach_s]
         peaks = fitted(tau)
         order = np.argsort(peaks)

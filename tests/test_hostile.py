@@ -113,7 +113,8 @@ def test_the_margin_between_turns_is_that_of_two_fits_by_hand(motion: hostile.Ti
             best.append((-float(turn.fun), float(turn.x)))
     best.sort()
     assert_allclose(margin, best[-1][0] - best[-2][0], rtol=0.001, atol=0.01)
-    assert_allclose(found_s, best[-1][1], rtol=0, atol=physical(1.0, "us"))
+    if margin > 1:  # of a sine, any turn is as good as the others
+        assert_allclose(found_s, best[-1][1], rtol=0, atol=physical(1.0, "us"))
 
 
 # What is asked of the estimates ---------------------------------------------------------------------------------------
