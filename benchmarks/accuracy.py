@@ -29,7 +29,6 @@ from typing import Any
 
 import numpy as np
 import scipy
-import scipy.signal
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -47,6 +46,7 @@ for folder in (ROOT / "reference", ROOT / "benchmarks"):
 
 import estimate_twin as twin  # noqa: E402 (the folders above are needed for it)
 import generic_delay  # noqa: E402
+from hostile import unit_noise  # noqa: E402
 
 Floats = NDArray[np.float64]
 
@@ -183,16 +183,6 @@ class Run:
             noise = [unit_noise(rng, shape, coefficient) for _ in range(min(CHUNK, self.draws - len(found)))]
             found += self.pool.map(judge, noise)
         return np.array(found)
-
-
-def unit_noise(rng: np.random.Generator, shape: tuple[int, ...], coefficient: float = 0.0) -> Floats:
-    """White noise, or e_n = coefficient e_{n-1} + white from its steady state on; standard deviation 1."""
-    white = rng.standard_normal(shape)
-    if not coefficient:
-        return white
-    innovation = np.sqrt(1 - coefficient**2)
-    white[..., 0] /= innovation
-    return np.asarray(scipy.signal.lfilter([innovation], [1.0, -coefficient], white))
 
 
 def moments(draws: Floats) -> tuple[Floats, Floats, Floats]:

@@ -48,7 +48,6 @@ HEARD = 0.3
 #: Windows are looked at where the target has this share of the record's deviation.
 LEAST_STD = 0.05
 WINDOWS_S = (1.0, 2.0, 4.0)
-FOUR_SECONDS = ("4 s: bias/sd", "cover", "none, %")
 FRACTIONS = np.linspace(0.0, 1.0, 11)
 WHOLE = "whole"
 
@@ -60,7 +59,7 @@ class Size:
     frequencies: Sequence[float] = FREQUENCIES
     shares: Sequence[float] = (0.01, 0.02, 0.05, 0.1)
     tone_draws: int = 60
-    hop_s: float = 0.25
+    hop_s: float = 0.5
     margins: int = 6  # readings of a record and place whose likelihoods are compared
     both_shares: Sequence[float] = (0.001, 0.003, 0.01, 0.03)
     bits: Sequence[int] = (10, 12, 16)
@@ -77,7 +76,6 @@ QUICK = Size(
     frequencies=(5.0, 10.0, 12.5, 14.0, 17.0, 20.0, 30.0),
     shares=(0.01, 0.1),
     tone_draws=6,
-    hop_s=0.5,
     margins=2,
     both_draws=44,
     rates_hz=(512.0, 1024.0),
@@ -393,19 +391,19 @@ class Cover:
 
 
 def asked_of_cover(bench: Bench, name: str, covers: Sequence[Cover]) -> None:
-    """A row: all cases together within 93 to 97 %, and each of them but for chance."""
+    """A row: the mean of the cases within 93 to 97 %, and each of them but for chance."""
     known = [c for c in covers if c.n]
     if not known:
         bench.asked(name, "93 to 97 %", "no interval at all", False)
         return
     low, high = min(known, key=lambda c: c.share), max(known, key=lambda c: c.share)
-    mean = float(np.average([c.share for c in known], weights=[c.n for c in known]))
+    mean = float(np.mean([c.share for c in known]))
     outside = sum(not c.near for c in known)
     bench.asked(
         name,
         "93 to 97 %",
-        f"{percent(mean)} %; {outside} of {len(known)} cases outside but for chance, {percent(low.share)} ({low.case})"
-        f" to {percent(high.share)} %",
+        f"mean {percent(mean)} %, {percent(low.share)} ({low.case}) to {percent(high.share)} %; {outside} of"
+        f" {len(known)} cases further off than chance allows",
         0.93 <= mean <= 0.97 and outside == 0,
         mean,
     )
@@ -462,16 +460,8 @@ def both(bench: Bench) -> None:
         " rate; 30 s. Bias over sd: of the delay and the gain, the largest over the fraction of a sample of a sine"
         " fitted to the draws. Cover of delay and gain; share without an interval.",
     )
-    bench.head(
-        "case",
-        "rms error, plain FEI's, us",
-        "bias/sd, d, A",
-        "cover, d, A, %",
-        "none, %",
-        "4 s: bias/sd",
-        "cover",
-        "none, %",
-    )
+    judged = ("bias/sd, d, A", "cover, d, A, %", "none, %")
+    bench.head("case", "rms error, plain FEI's, us", *judged, *(f"4 s: {word}" for word in judged))
     dirts: list[float | int] = [*size.both_shares, *size.bits]
     covers: dict[bool, list[Cover]] = {False: [], True: []}
     biases: dict[bool, list[float]] = {False: [], True: []}
@@ -479,12 +469,15 @@ def both(bench: Bench) -> None:
     rms: dict[tuple[str, float], Floats] = {}
     for m, motion in enumerate(motions(size)):
         for (r, rate_hz), (d, dirt) in itertools.product(enumerate(size.rates_hz), enumerate(dirts)):
+            bits = isinstance(dirt, int)
+            if bits and motion.name.startswith("chirp"):
+                continue  # of one amplitude: cycle by cycle the same roundings, which no one can tell from a gain
             judge = _both_judge(motion, rate_hz, dirt)
             draws = bench.repeat(20_000 + 1000 * m + 100 * r + d, size.both_draws, judge)
             whole, moving = Found.of(x[0] for x in draws), Found.of(x[1] for x in draws)
-            moving = moving.taking(_strong(motion, rate_hz, 4.0))
+            # In weak windows a few steps of the converter are all there is, and rounding is no noise.
+            moving = moving.taking(_strong(motion, rate_hz, 4.0, least=0.25 if bits else LEAST_STD))
             truth = np.array([x[2] for x in draws])[:, None]
-            bits = isinstance(dirt, int)
             label = f"{motion.name}, {rate_hz:g} Hz, {_dirt(dirt)}"
             cells = []
             for found, where in ((whole, WHOLE), (moving, "4 s")):
@@ -498,7 +491,7 @@ def both(bench: Bench) -> None:
                           percent(found.withheld)]  # fmt: skip
             errors = np.stack([whole.gain - GAIN, whole.delay_s - truth], axis=-1)[:, 0]
             plain = np.array([x[3] for x in draws]) - np.column_stack([np.full(len(truth), GAIN), truth])
-            spread = np.sqrt(np.nanmean(np.stack([errors, plain]) ** 2, axis=1))
+            spread = np.sqrt(np.nanmean(np.stack([errors, plain]) ** 2, axis=1))  # (trusted, plain), (gain, delay)
             if rate_hz == RATE_HZ:
                 rms[motion.name, dirt] = spread
             bench.case(label, f"{1e6 * spread[0, 1]:.3g}, {1e6 * spread[1, 1]:.3g}", *cells)
@@ -540,23 +533,26 @@ def _both_judge(motion: Periodic, rate_hz: float, dirt: float | int) -> Callable
     return judge
 
 
-def _strong(motion: Periodic, rate_hz: float, window_s: float, hop_s: float | None = None) -> NDArray[np.bool_]:
-    """Windows, by default one after the other, in which the target has at least 5 % of the record's deviation."""
+def _strong(
+    motion: Periodic, rate_hz: float, window_s: float, hop_s: float | None = None, least: float = LEAST_STD
+) -> NDArray[np.bool_]:
+    """Windows, by default one after the other, in which the target has this share of the record's deviation."""
     x, length, hop = motion.samples(rate_hz), round(window_s * rate_hz), round((hop_s or window_s) * rate_hz)
     stds = [np.std(x[s : s + length]) for s in range(0, len(x) - length + 1, hop)]
-    return np.array(stds) >= LEAST_STD * np.std(x)
+    return np.array(stds) >= least * np.std(x)
 
 
 def _sentences(bench: Bench, rms: dict[tuple[str, float], Floats]) -> None:
     """What `assess` says to use, beside what was better: `rms` errors of (trusted, plain), of (gain, delay)."""
     said, worse, count = 0, Counter[str](), 0
-    for (m, motion), d in itertools.product(enumerate(motions(bench.size)), {d: None for _, d in rms}):
+    known = {motion.name: motion for motion in motions(bench.size)}
+    for m, (name, d) in enumerate(rms):
 
-        def judge(i: int, rng: np.random.Generator, motion: Periodic = motion, dirt: float | int = d) -> str:
+        def judge(i: int, rng: np.random.Generator, motion: Periodic = known[name], dirt: float | int = d) -> str:
             target, measured, _ = _both_pair(motion, RATE_HZ, dirt, 3 * i + 2, rng)
             return str(rthstrack.assess(target, measured, RATE_HZ).argument)
 
-        trusted, plain = rms[motion.name, d]
+        trusted, plain = rms[name, d]
         for sentence in bench.repeat(30_000 + m, bench.size.assess_draws, judge):
             count += 1
             if sentence.startswith("use the trusted estimate"):
@@ -566,9 +562,7 @@ def _sentences(bench: Bench, rms: dict[tuple[str, float], Floats]) -> None:
                 about = {"gain": "in amplitude" in gap, "delay": " ms " in gap or "in amplitude" not in gap}
                 bad = [n for k, n in enumerate(("gain", "delay")) if about[n] and trusted[k] > plain[k]]
                 if bad:
-                    worse[
-                        f"{_listed(bad)} of {motion.name}, {f'{d} bit' if isinstance(d, int) else percent(d) + ' %'}"
-                    ] += 1
+                    worse[f"{_listed(bad)} of {name}, {_dirt(d)}"] += 1
     if bench.tell and worse:
         print("   worse:", "; ".join(f"{name} ({n})" for name, n in worse.items()))
     bench.asked(
@@ -774,7 +768,8 @@ def cost(bench: Bench) -> None:
     bench.say("### Cost", "", "Medians over those of plain FEI, P = Q = 1, called by turns on one core.")
     bench.head("case", "fei, us", "least_squares / fei", "aligned / fei")
     motion = hostile.response("1 Hz")
-    worst = {"least_squares": 0.0, "aligned": 0.0}
+    asked = {"least_squares": 3.5, "aligned": 4.0}
+    worst: Counter[tuple[str, float]] = Counter()
     for window, first_s, last_s in (("hann", 8.0, 12.0), ("boxcar", 0.0, 30.0), ("boxcar", 8.0, 12.0)):
         for share in (0.0, 0.01):
             rng = np.random.Generator(np.random.PCG64(60_000))
@@ -794,17 +789,19 @@ def cost(bench: Bench) -> None:
                     plan.evaluate(target, measured)
                     taken.append(time.perf_counter() - begun)
             fei, *others = (statistics.median(taken) for taken in times)
-            ratios = dict(zip(worst, (other / fei for other in others), strict=True))
-            worst = {name: max(worst[name], ratio) for name, ratio in ratios.items()}
+            ratios = dict(zip(asked, (other / fei for other in others), strict=True))
+            for name, ratio in ratios.items():
+                worst[name, share] = max(worst[name, share], ratio)
             bench.case(
                 f"{last_s - first_s:g} s, {window}, {'no noise' if share == 0 else '1 % on both'}",
                 f"{1e6 * fei:.0f}",
                 *(f"{ratio:.2f}" for ratio in ratios.values()),
             )
     bench.say()
-    for name, most in (("least_squares", 3.5), ("aligned", 4.0)):
-        bench.asked(f"cost, `{name}` over `fei`, worst", f"<= {most:g}", f"{worst[name]:.2f}", worst[name] <= most,
-                    worst[name])  # fmt: skip
+    for (name, share), ratio in sorted(worst.items(), reverse=True):
+        noise = "1 % noise on both channels" if share else "no noise"
+        bench.asked(f"cost, `{name}` over `fei`, {noise}, worst case", f"<= {asked[name]:g}", f"{ratio:.2f}",
+                    ratio <= asked[name], ratio)  # fmt: skip
 
 
 # The section ----------------------------------------------------------------------------------------------------------

@@ -10,7 +10,10 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import minimize_scalar
 
+import rthstrack
+
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "benchmarks"))
+import accuracy
 import accuracy_hostile
 import hostile
 from tolerances import physical, round_off
@@ -177,3 +180,17 @@ def test_content_too_high_for_the_rate_has_no_interval(bench: accuracy_hostile.B
 def test_a_delay_beyond_the_search_is_said_to_be_beyond(bench: accuracy_hostile.Bench) -> None:
     for row in rows(bench, "a delay of 400 ms"):
         assert row.value == 0, row
+
+
+def test_what_was_asked_joins_the_document(
+    bench: accuracy_hostile.Bench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(accuracy, "SIBLINGS", ("accuracy_hostile",))
+    monkeypatch.setattr(accuracy_hostile, "_full", lambda: bench)
+    run = accuracy.computed(rthstrack, tmp_path, short=True, sections=[])
+    text = accuracy.document(run, accuracy.siblings(run))
+    head, _, body = text.partition("\n## Under attack\n")
+    for row in bench.rows:
+        assert f"| {row.case} | {row.asked} |" in head
+    for title in ("Tones", "The same noise", "Noise that changes", "Smaller"):
+        assert f"\n### {title}" in body
