@@ -234,7 +234,7 @@ class Turns:
         self.rate_hz, self.coefficient, self.reach_s = rate_hz, coefficient, reach_s
         # Correlations have no more band than the motion: a spline of degree 7 through 12 points a period is exact.
         self.step = 1 / (12 * motion.high_hz)
-        count = int(np.ceil(reach_s / self.step)) + 4
+        count = int(np.ceil(reach_s / self.step)) + 16  # the spline is less exact towards its ends
         self.taus = self.step * np.arange(-count, count + 1)
         self.rows = np.stack([self._whitened(motion.samples(rate_hz, tau)) for tau in self.taus])
 

@@ -84,7 +84,7 @@ def test_the_velocity_that_noise_follows_is_the_slope_of_the_motion() -> None:
 @pytest.mark.parametrize("coefficient", [0.0, 0.9])
 @pytest.mark.parametrize("motion", TONES[:3], ids=lambda m: m.name)
 def test_the_margin_between_turns_is_that_of_two_fits_by_hand(motion: hostile.Timed, coefficient: float) -> None:
-    delay_s, std = 0.0123, 0.05
+    delay_s, std = 0.0123, 0.005
     rng = np.random.Generator(np.random.PCG64(8))
     noise = std * hostile.unit_noise(rng, (round(motion.seconds * RATE_HZ),), coefficient)
     measured = 0.9 * motion.samples(RATE_HZ, delay_s) + noise
