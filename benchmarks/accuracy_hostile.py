@@ -60,7 +60,7 @@ class Size:
     shares: Sequence[float] = (0.01, 0.02, 0.05, 0.1)
     tone_draws: int = 60
     hop_s: float = 0.5
-    margins: int = 6  # readings of a record and place whose likelihoods are compared
+    margins: int = 4  # readings of a record and place whose likelihoods are compared
     both_shares: Sequence[float] = (0.001, 0.003, 0.01, 0.03)
     bits: Sequence[int] = (10, 12, 16)
     both_draws: int = 1000
