@@ -29,7 +29,6 @@ from typing import Any
 
 import numpy as np
 import scipy
-import scipy.signal
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -47,6 +46,7 @@ for folder in (ROOT / "reference", ROOT / "benchmarks"):
 
 import estimate_twin as twin  # noqa: E402 (the folders above are needed for it)
 import generic_delay  # noqa: E402
+from hostile import unit_noise  # noqa: E402
 
 Floats = NDArray[np.float64]
 
@@ -183,16 +183,6 @@ class Run:
             noise = [unit_noise(rng, shape, coefficient) for _ in range(min(CHUNK, self.draws - len(found)))]
             found += self.pool.map(judge, noise)
         return np.array(found)
-
-
-def unit_noise(rng: np.random.Generator, shape: tuple[int, ...], coefficient: float = 0.0) -> Floats:
-    """White noise, or e_n = coefficient e_{n-1} + white from its steady state on; standard deviation 1."""
-    white = rng.standard_normal(shape)
-    if not coefficient:
-        return white
-    innovation = np.sqrt(1 - coefficient**2)
-    white[..., 0] /= innovation
-    return np.asarray(scipy.signal.lfilter([innovation], [1.0, -coefficient], white))
 
 
 def moments(draws: Floats) -> tuple[Floats, Floats, Floats]:
@@ -880,7 +870,7 @@ SECTIONS: tuple[Callable[[Run], None], ...] = (
     large_delays,
     machine,
 )
-SIBLINGS = ("accuracy_factors", "accuracy_response")
+SIBLINGS = ("accuracy_factors", "accuracy_response", "accuracy_hostile")
 
 
 def computed(
@@ -921,13 +911,15 @@ def document(run: Run, also: Sequence[str]) -> str:
     return "\n".join([*head, *run.lines, *also])
 
 
-def siblings() -> list[str]:
-    """Sections of other files of this folder, where they are."""
+def siblings(run: Run) -> list[str]:
+    """Sections of other files of this folder, where they are; what was asked of them joins the first table."""
     found = []
     for name in SIBLINGS:
         if (ROOT / "benchmarks" / f"{name}.py").is_file():
             begun = time.perf_counter()
-            found.append(str(importlib.import_module(name).section()))
+            sibling = importlib.import_module(name)
+            found.append(str(sibling.section()))
+            run.rows += [Row(*dataclasses.astuple(row)) for row in getattr(sibling, "rows", list)()]
             print(f"accuracy: {name} {time.perf_counter() - begun:.0f} s", file=sys.stderr)
     return found
 
@@ -945,7 +937,7 @@ def main() -> int:
     arguments.out.mkdir(parents=True, exist_ok=True)
     chosen = [s for s in SECTIONS if not arguments.only or s.__name__ in arguments.only]
     run = computed(tool, arguments.out, arguments.short, arguments.draws, chosen)
-    text = document(run, [] if arguments.short or arguments.only else siblings())
+    text = document(run, [] if arguments.short or arguments.only else siblings(run))
     (arguments.out / "accuracy.md").write_text(text, encoding="utf-8")
     print(text)
     return 0
