@@ -49,6 +49,11 @@ impl CausalDecimator {
         Ok(Self { factor, taps, arch: Arch::new() })
     }
 
+    /// The same rate from the taps of twice the factor: what is above rate / (4 P) is gone, rate / (8 P) and below passes.
+    pub(crate) fn oversampled(factor: usize) -> Self {
+        Self { factor, taps: taps(2 * factor), arch: Arch::new() }
+    }
+
     /// P.
     pub fn factor(&self) -> usize {
         self.factor
@@ -77,6 +82,24 @@ impl CausalDecimator {
             return Some(sample);
         }
         Some(self.arch.dispatch(Dot { taps: &self.taps, samples: state.samples.last(self.taps.len()) }))
+    }
+
+    /// out[m] from the samples from m P on: it speaks for sample m P + [`CausalDecimator::delay`].
+    pub(crate) fn block(&self, samples: &[f64], out: &mut [f64]) {
+        for (m, y) in out.iter_mut().enumerate() {
+            let at = m * self.factor;
+            *y = self.arch.dispatch(Dot { taps: &self.taps, samples: &samples[at..at + self.taps.len()] });
+        }
+    }
+
+    /// What it makes of white noise of variance 1: its variance, and how it correlates from one output to the next ones.
+    pub(crate) fn of_white_noise<const N: usize>(&self) -> (f64, [f64; N]) {
+        let product = |l: usize| -> f64 {
+            let later = self.taps.iter().skip(l * self.factor);
+            self.taps.iter().zip(later).map(|(a, b)| a * b).sum()
+        };
+        let variance = product(0);
+        (variance, std::array::from_fn(|l| product(l) / variance))
     }
 
     /// All outputs of a record: output m speaks for sample m P + [`CausalDecimator::delay`].

@@ -24,8 +24,11 @@ pub(crate) const MAX_STEP: usize = 64;
 const MAX_STRETCH: usize = 8192;
 /// Samples that are looked at, before averaging, at most: likewise.
 const LONGEST: usize = 1 << 20;
-/// How many times as far is looked where measured seems to move against target.
+/// How many times as far is looked where measured seems to move against target, or not along with it up to a correlation;
 const FARTHER: usize = 4;
+const WELL_FOLLOWED: f64 = 0.98;
+/// and so little of what a correlation leaves must be left there for it to be the place.
+const LEFT: f64 = 0.5;
 /// Fewest cycles of the target in the window: more than half a wave, whose delay cannot be told from an offset.
 const MIN_CYCLES: f64 = 0.6;
 /// Peaks that are looked at: a tone has as many as it has turns within reach.
@@ -120,7 +123,7 @@ struct Correlated {
     step: usize,
     /// Cycles that the target moves through.
     cycles: f64,
-    /// The lowest and the highest of them.
+    /// The lowest and the highest of them, of lags longer than a given one.
     lowest: f64,
     highest: f64,
 }
@@ -158,25 +161,29 @@ impl Search {
         start: usize,
         expected: Option<f64>,
     ) -> Result<Peaks, Reason> {
-        let outside = (start - view.origin).min(view.end() - (start + self.n_samples));
+        let outside = start.saturating_sub(view.origin).min(view.end().saturating_sub(start + self.n_samples));
         let reach = self.reach.min(outside.max(self.n_samples / 4)) / self.max_step * self.max_step;
-        let near = self.correlate(state, view, start, reach)?;
+        let near = self.correlate(state, view, start, reach, 0)?;
         if near.cycles < MIN_CYCLES {
             return Err(Reason::FewCycles { found: near.cycles });
         }
         let mut found =
             Peaks { peaks: [Peak::default(); MAX_PEAKS], n_peaks: 0, step: near.step, reach, cycles: near.cycles };
         found.collect(&state.correlations[..2 * near.lags + 1], near, expected);
-        if -near.lowest > near.highest + OPPOSITE_MARGIN {
-            // Half a cycle out of reach looks like a sign: what moves along farther away tells.
+        let opposite = -near.lowest > near.highest + OPPOSITE_MARGIN;
+        let highest = found.first().correlation;
+        if opposite || highest < WELL_FOLLOWED {
+            // Half a cycle out of reach looks like a sign, and a whole one like the delay: what lies farther away tells.
             let farther = (FARTHER.min(near.step) * reach).min(2 * self.n_samples / 5) / self.max_step * self.max_step;
-            let beyond = farther > reach
-                && self.correlate(state, view, start, farther).is_ok_and(|far| far.highest > -near.lowest);
-            return Err(if beyond {
-                Reason::BeyondMaxDelay { max_delay_s: reach as f64 / self.rate_hz }
-            } else {
-                Reason::OppositeSign
-            });
+            let left = 1.0 - highest.max(if opposite { -near.lowest } else { 0.0 });
+            if farther > reach
+                && self.correlate(state, view, start, farther, reach).is_ok_and(|far| 1.0 - far.highest < LEFT * left)
+            {
+                return Err(Reason::BeyondMaxDelay { max_delay_s: reach as f64 / self.rate_hz });
+            }
+            if opposite {
+                return Err(Reason::OppositeSign);
+            }
         }
         if found.n_peaks == 0 {
             return Err(Reason::Still);
@@ -184,13 +191,14 @@ impl Search {
         Ok(found)
     }
 
-    /// Correlates at lags of up to `reach` samples to either side.
+    /// Correlates at lags of up to `reach` samples to either side; the lowest and highest are of those from `inner` on.
     fn correlate(
         &self,
         state: &mut SearchState,
         view: &View<'_>,
         start: usize,
         reach: usize,
+        inner: usize,
     ) -> Result<Correlated, Reason> {
         let mut from = start.max(view.origin + reach);
         let mut to = (start + self.n_samples).min(view.end().saturating_sub(reach));
@@ -245,7 +253,9 @@ impl Search {
             let comparable = own > round_off && spread > 0.0;
             moved |= comparable;
             correlations[k] = if comparable { correlations[k] / (own.sqrt() * spread.sqrt()) } else { 0.0 };
-            (lowest, highest) = (lowest.min(correlations[k]), highest.max(correlations[k]));
+            if k.abs_diff(lags) * step >= inner {
+                (lowest, highest) = (lowest.min(correlations[k]), highest.max(correlations[k]));
+            }
             if k + 1 < correlations.len() {
                 let (leaves, enters) = (target[k], target[k + n]);
                 sum += enters - leaves;

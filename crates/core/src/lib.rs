@@ -11,7 +11,7 @@
 //! 4. `spectrum`: Q by folding, the transform, the kept bins.
 //! 5. [`tracking`]: Eqs 6-12, amplitude and delay; [`Evaluator`] is the plan, [`EvaluatorState`] its buffers.
 //! 6. `alignment`: the estimators that shift the target before it is windowed; `lag` finds where to start, `lagrange` reads
-//!    between samples, `noise` gives the intervals, [`reason`] says why there is none.
+//!    between samples, `floor` tells how noisy the target is, `noise` gives the intervals, [`reason`] says why there is none.
 //! 7. [`moving`]: the same over moving windows.
 //! 8. [`monitor`]: the same while the test runs, sample by sample; [`causal`] is its P.
 //! 9. [`factors`]: the largest P and Q that a tolerance allows.
@@ -33,6 +33,7 @@ pub mod decimate;
 pub mod dynamics;
 pub mod error;
 pub mod factors;
+mod floor;
 pub mod indices;
 pub mod key_frequencies;
 mod lag;

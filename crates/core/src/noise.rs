@@ -344,8 +344,8 @@ pub(crate) struct Spread<'a> {
 /// What noise on the target adds.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct NoisyTarget<'a> {
-    /// Of the kept bins in the fit.
-    pub(crate) weights: &'a [f64],
+    /// Of the kept bins in the fit, where they are not all alike.
+    pub(crate) weights: Option<&'a [f64]>,
     /// The residual holds -K times the target's noise: sum E conj Y is minus this share of sum |E|^2 by that alone.
     pub(crate) share: f64,
 }
@@ -422,7 +422,7 @@ impl<'a> Spread<'a> {
         cell.cross_re[0] += 0.5 * residual * y;
     }
 
-    /// The precision, with the noise's spectrum taken from blocks of n^0.4 independent bins to either side; `None` where
+    /// The precision, with the noise's spectrum taken from blocks of n^0.3 independent bins to either side; `None` where
     /// there are too few bins for one.
     pub(crate) fn precision(&self, n_samples: usize) -> Option<Precision> {
         let Sampling { window_power, bins_per_piece, scale } = self.sampling;
@@ -430,7 +430,7 @@ impl<'a> Spread<'a> {
         if pieces < FEWEST {
             return None;
         }
-        let half = (n_samples as f64).powf(0.4).max(FEWEST);
+        let half = (n_samples as f64).powf(0.3).max(FEWEST);
         let pieces_per_cell = self.width as f64 / (bins_per_piece * self.changes.alike());
         let cells_per_block = ((2.0 * half / pieces_per_cell).round() as usize).clamp(1, self.cells.len());
         // A last block that is not full joins the one before it.
@@ -554,8 +554,8 @@ impl Sink for Spread<'_> {
             return;
         }
         let mut weight = [1.0; W];
-        if let Some(noisy_target) = self.noisy_target {
-            weight = std::array::from_fn(|i| noisy_target.weights[at + i]);
+        if let Some(NoisyTarget { weights: Some(weights), .. }) = self.noisy_target {
+            weight = std::array::from_fn(|i| weights[at + i]);
         }
         let Forms { gain, delay, leverage } = self.forms;
         let (vr, vi) = (er, ei);

@@ -53,6 +53,11 @@ pub enum Reason {
         /// Coherence of residual and target.
         coherence: f64,
     },
+    /// No interval: the target moves too fast to be read between samples.
+    TooFast {
+        /// Share of the target's energy that lies above about 0.35 of the rate.
+        share: f64,
+    },
     /// No interval: too few frequency bins to know the noise by.
     FewBins,
     /// No interval: it is known for weight power 2 only.
@@ -62,7 +67,10 @@ pub enum Reason {
 impl Reason {
     /// Whether there is no number either.
     pub fn is_undetermined(&self) -> bool {
-        !matches!(self, Reason::ResidualFollowsTarget { .. } | Reason::FewBins | Reason::WeightPower)
+        !matches!(
+            self,
+            Reason::ResidualFollowsTarget { .. } | Reason::TooFast { .. } | Reason::FewBins | Reason::WeightPower
+        )
     }
 }
 
@@ -120,6 +128,12 @@ impl fmt::Display for Reason {
                 f,
                 "no interval: what one gain and one delay leave still follows target (coherence {coherence:.2}), so they \
                  are not constant over frequency or time"
+            ),
+            Reason::TooFast { share } => write!(
+                f,
+                "no interval: {:.2} % of target's motion lies above a third of the sample rate, too fast to be read between \
+                 samples; sample faster",
+                100.0 * share
             ),
             Reason::FewBins => write!(f, "no interval: too few frequency bins to know the noise by"),
             Reason::WeightPower => write!(f, "no interval: it is known for weight power 2 only"),

@@ -196,6 +196,8 @@ pub struct Tracking {
     pub residual_coherence: f64,
     /// 1 - sum (O - A I_d)^2 / sum (O - mean O)^2: the share of measured that one gain and one delay explain.
     pub goodness: f64,
+    /// Standard deviation of the noise that is the target's own, in its unit, where it was taken into account; else 0.
+    pub target_noise: f64,
     /// Why there is no number, or no interval.
     pub reason: Option<Reason>,
 }
@@ -215,6 +217,7 @@ impl Tracking {
             delay_interval_s: (f64::NAN, f64::NAN),
             residual_coherence: f64::NAN,
             goodness: f64::NAN,
+            target_noise: 0.0,
             reason: Some(reason),
         }
     }
@@ -797,10 +800,8 @@ impl Evaluator {
                 stream(pair.target()).zip(stream(pair.measured())).map(|(target, measured)| [target, measured])
             }
         };
-        let expected = self
-            .alignment
-            .as_ref()
-            .and_then(|_| self.expected().or_else(|| Alignment::expected(pair, &self.config)));
+        let expected =
+            self.alignment.as_ref().and_then(|_| self.expected().or_else(|| Alignment::expected(pair, &self.config)));
         Moving { evaluator: self, state: self.state(), pair, streams, expected }
     }
 }

@@ -1,15 +1,17 @@
-//! Frequency bins, of all samples or of averages of a few.
+//! Frequency bins, of all samples, of averages of a few, or of every second.
 
 use std::ops::Range;
 
 use crate::error::Result;
 use crate::spectrum::{Spectrum, SpectrumConfig};
+use crate::sums;
 
 /// Bins and how to come to them.
 pub(super) struct Grid {
     pub(super) spectrum: Spectrum,
-    /// Samples that are averaged before the transform.
+    /// Samples that become one before the transform, and whether by their average or by the first of them.
     pub(super) step: usize,
+    average: bool,
     /// What makes good the droop of the cascade, or of the averages.
     pub(super) correction: Option<Vec<f64>>,
     /// cos of the bins' frequencies, in radians a sample (after averaging).
@@ -20,7 +22,7 @@ impl Grid {
     pub(super) fn new(config: SpectrumConfig) -> Result<Self> {
         let spectrum = Spectrum::new(config)?;
         let cosines = radians(&spectrum, config.rate_hz).map(f64::cos).collect();
-        Ok(Self { step: 1, correction: spectrum.correction(), spectrum, cosines })
+        Ok(Self { step: 1, average: false, correction: spectrum.correction(), spectrum, cosines })
     }
 
     /// The bins up to the rate over 2 `factor`, from averages of a quarter as many samples: what aliases onto the highest of
@@ -34,7 +36,24 @@ impl Grid {
         let gain = |w: f64| (0.5 * w * step as f64).sin() / (0.5 * w).sin();
         let correction = Some(radians(&spectrum, config.rate_hz).map(|w| (step * step) as f64 / gain(w)).collect());
         let cosines = radians(&spectrum, rate_hz).map(f64::cos).collect();
-        Ok(Self { spectrum, step, correction, cosines })
+        Ok(Self { spectrum, step, average: true, correction, cosines })
+    }
+
+    /// All bins of every second sample, of samples that hold nothing above a quarter of their rate.
+    pub(super) fn halved(config: SpectrumConfig) -> Result<Self> {
+        let (n_samples, rate_hz) = (config.n_samples.div_ceil(2), config.rate_hz / 2.0);
+        let half = Self::new(SpectrumConfig { n_samples, rate_hz, ..config })?;
+        let correction = Some(vec![2.0; half.spectrum.n_bins()]);
+        Ok(Self { step: 2, correction, ..half })
+    }
+
+    /// The samples that are transformed, one for each `step`.
+    pub(super) fn shorten(&self, samples: &[f64], out: &mut [f64]) {
+        if self.average {
+            sums::block_means(samples, self.step, out);
+        } else {
+            out.iter_mut().zip(samples.iter().step_by(self.step)).for_each(|(y, x)| *y = *x);
+        }
     }
 
     /// Length of the zero-padded samples over Q.
@@ -42,8 +61,8 @@ impl Grid {
         (self.step * self.spectrum.folded_len()) as f64
     }
 
-    /// Where the averages of samples in `within` stand, those that are of such samples only.
-    pub(super) fn averaged(&self, within: &Range<usize>) -> Range<usize> {
+    /// Where those of them stand that come of samples in `within` only.
+    pub(super) fn shortened(&self, within: &Range<usize>) -> Range<usize> {
         within.start.div_ceil(self.step)..within.end / self.step
     }
 }

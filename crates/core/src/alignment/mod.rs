@@ -23,7 +23,9 @@ use pulp::{Arch, Simd, WithSimd};
 use crate::alignment::grid::Grid;
 use crate::alignment::products::{Cross, Multiply, Products};
 use crate::alignment::weighting::{Energies, Weighting};
+use crate::causal::CausalDecimator;
 use crate::error::Result;
+use crate::floor;
 use crate::lag::{MAX_PEAKS, MAX_STEP, Peaks, Search, SearchState, View};
 use crate::lagrange::{AFTER, BEFORE, NODES, Taps};
 use crate::noise::{
@@ -58,6 +60,17 @@ const MAX_REFERENCES: usize = 3;
 const LEAST_GAIN: f64 = 1.0;
 /// So much less likely, were the noise white, it is less likely in any noise.
 const CLEAR_ODDS: f64 = 1e3 * LOG_ODDS;
+/// The bias of noise on the target may be this share of the standard deviation.
+const NOISY_SHARE: f64 = 0.05;
+/// At a lower rate this share of the target's velocity may be lost, as energy.
+const SLOW_SHARE: f64 = 0.01;
+/// Octaves in which its velocity is looked at.
+const MAX_SCALES: usize = 16;
+/// Above a third of the rate, where samples are too far apart to be read between, this share of the target's energy may lie.
+const FAST_SHARE: f64 = 1e-4;
+/// Samples that a lower rate leaves, at least and at most.
+const MIN_DECIMATED: usize = 256;
+const MAX_DECIMATED: usize = 1 << 19;
 /// A residual of this share of measured is as good as none: that of interpolation, of the last step and of round-off.
 const EXACT: f64 = 1e-11;
 
@@ -80,32 +93,46 @@ pub(crate) struct Alignment {
     low: Option<Low>,
     /// All bins are kept, so that sums over samples serve.
     in_time: bool,
+    /// How white noise on the target correlates between the samples that are judged, and over the kept bins.
+    correlation: [f64; NODES],
+    correlation_in_bins: [f64; NODES],
+    /// Plans for the same decimated by 2, 4, ..., for a target with noise of its own.
+    levels: Vec<Level>,
     arch: Arch,
 }
 
-/// Bins of averages of a few samples, and the window at these.
+/// A plan for the samples of a lower rate.
+struct Level {
+    decimator: CausalDecimator,
+    /// Variance of what the decimator leaves of white noise of variance 1.
+    variance: f64,
+    alignment: Alignment,
+}
+
+/// Bins of fewer samples, and the window at these.
 struct Low {
     grid: Grid,
     window: Option<Vec<f64>>,
+    /// Serves any target, not only one that moves slowly.
+    always: bool,
 }
 
 impl Low {
-    fn new(plan: SpectrumConfig, factor: usize, window: Option<&[f64]>) -> Result<Self> {
-        let grid = Grid::low(plan, factor)?;
+    fn new(grid: Grid, window: Option<&[f64]>, always: bool) -> Self {
         let window = window.map(|w| {
-            let mut averages = vec![0.0; w.len().div_ceil(grid.step)];
-            sums::block_means(w, grid.step, &mut averages);
-            averages
+            let mut fewer = vec![0.0; w.len().div_ceil(grid.step)];
+            grid.shorten(w, &mut fewer);
+            fewer
         });
-        Ok(Self { grid, window })
+        Self { grid, window, always }
     }
 }
 
-/// Buffers of the same: averages of residual, displacement and velocity.
+/// Buffers of the same: residual, displacement and velocity.
 #[derive(Debug, Clone)]
 struct LowState {
     scratch: Scratch,
-    averages: [Vec<f64>; 3],
+    fewer: [Vec<f64>; 3],
 }
 
 /// Its buffers.
@@ -123,6 +150,11 @@ pub(crate) struct AlignmentState {
     /// The best fit's residual, likewise, to compare others with.
     whitened_residual: Vec<f64>,
     weighting: Weighting,
+    /// Variance of the noise that is the target's own, a sample; 0 where it is taken for exact.
+    target_noise: f64,
+    /// Target and measured, decimated, and the buffers of each level.
+    decimated: [Vec<f64>; 2],
+    levels: Vec<AlignmentState>,
 }
 
 /// n samples each, zero outside the judged ones.
@@ -146,8 +178,9 @@ struct Fit {
     step: f64,
     gain: f64,
     products: Products,
-    /// The same less what noise on the target adds.
+    /// The same less what noise on the target adds, and that noise's energy.
     clean: Products,
+    noise: f64,
     residual: f64,
     /// The share of measured that is explained, where the signals in the state do not tell.
     goodness: Option<f64>,
@@ -207,27 +240,43 @@ impl Odds {
 impl Alignment {
     /// The plan of a configuration that [`crate::Evaluator::new`] has checked.
     pub(crate) fn new(n_samples: usize, rate_hz: f64, config: &EvaluatorConfig) -> Result<Self> {
+        let mut plan = Self::of_samples(n_samples, rate_hz, config)?;
+        if plan.in_time {
+            let least = n_samples.div_ceil(MAX_DECIMATED).next_power_of_two().max(2);
+            let factors = std::iter::successors(Some(least), |p| Some(2 * p));
+            for factor in factors.take_while(|p| p * MIN_DECIMATED <= n_samples) {
+                let decimator = CausalDecimator::oversampled(factor);
+                let mut alignment = Self::of_samples(n_samples / factor, rate_hz / factor as f64, config)?;
+                let halved = Grid::halved(spectrum_config(alignment.n_samples, alignment.rate_hz, config))?;
+                alignment.low = Some(Low::new(halved, alignment.window.as_deref(), true));
+                let (variance, correlation) = decimator.of_white_noise();
+                alignment.correlation = correlation;
+                plan.levels.push(Level { decimator, variance, alignment });
+            }
+        }
+        Ok(plan)
+    }
+
+    /// The plan without that of lower rates.
+    fn of_samples(n_samples: usize, rate_hz: f64, config: &EvaluatorConfig) -> Result<Self> {
         let EvaluatorConfig { data_decimation, frequency_decimation, band_hz, .. } = *config;
-        // What is done to the samples is done here, over those that are judged.
-        let plan = SpectrumConfig {
-            n_samples,
-            rate_hz,
-            data_decimation,
-            frequency_decimation,
-            window: Window::Boxcar,
-            detrend: Detrend::None,
-            band_hz,
-        };
+        let plan = spectrum_config(n_samples, rate_hz, config);
         let undecimated = data_decimation == 1 && frequency_decimation == 1 && band_hz.is_none();
         let exact_target = config.noise_ratio == 0.0;
         let window = config.window.coefficients(n_samples);
         let low = 1usize << (rate_hz / (2.0 * LOW_HZ)).clamp(1.0, 1e6).log2() as u32;
         let low = (undecimated && exact_target && low >= SHORTENING && n_samples >= 2 * low * low)
-            .then(|| Low::new(plan, low, window.as_deref()));
+            .then(|| Grid::low(plan, low))
+            .transpose()?
+            .map(|grid| Low::new(grid, window.as_deref(), false));
+        let kept = Grid::new(plan)?;
         Ok(Self {
             estimator: config.estimator,
             n_samples,
             rate_hz,
+            correlation: std::array::from_fn(|l| if l == 0 { 1.0 } else { 0.0 }),
+            correlation_in_bins: weighting::correlation(kept.cosines.iter().map(|c| (1.0, *c))),
+            levels: Vec::new(),
             max_delay: config.max_delay_s * rate_hz,
             noise: config.noise,
             noise_ratio: config.noise_ratio,
@@ -236,8 +285,8 @@ impl Alignment {
             moments: window.as_deref().map_or((0.0, 0.0), moments),
             window,
             search: Search::new(n_samples, rate_hz, config.max_delay_s),
-            kept: Grid::new(plan)?,
-            low: low.transpose()?,
+            kept,
+            low,
             in_time: config.estimator == Estimator::LeastSquares && undecimated && exact_target,
             arch: Arch::new(),
         })
@@ -254,7 +303,7 @@ impl Alignment {
             scratch: self.kept.spectrum.scratch(),
             low: self.low.as_ref().map(|low| LowState {
                 scratch: low.grid.spectrum.scratch(),
-                averages: std::array::from_fn(|_| vec![0.0; n.div_ceil(low.grid.step)]),
+                fewer: std::array::from_fn(|_| vec![0.0; n.div_ceil(low.grid.step)]),
             }),
             spread: SpreadState::new(self.kept.spectrum.n_bins()),
             whitened: std::array::from_fn(|_| vec![0.0; whitened]),
@@ -264,6 +313,11 @@ impl Alignment {
                 factors: vec![0.0; weighted],
                 correlation: [0.0; NODES],
             },
+            target_noise: 0.0,
+            decimated: std::array::from_fn(|_| {
+                vec![0.0; self.levels.iter().map(|l| l.alignment.longest_view()).max().unwrap_or(0)]
+            }),
+            levels: self.levels.iter().map(|l| l.alignment.state()).collect(),
         }
     }
 
@@ -282,7 +336,86 @@ impl Alignment {
         }
     }
 
+    /// As the target is exact, or as its own noise demands.
     fn determine(
+        &self,
+        state: &mut AlignmentState,
+        view: &View<'_>,
+        start: usize,
+        expected: Option<f64>,
+    ) -> std::result::Result<Tracking, Reason> {
+        state.target_noise = 0.0;
+        if self.estimator != Estimator::LeastSquares || self.noise_ratio > 0.0 || self.noise == Noise::Coloured {
+            return self.judge(state, view, start, expected);
+        }
+        let own = start - view.origin..start + self.n_samples - view.origin;
+        let (target, measured) = (&view.target[own.clone()], &view.measured[own]);
+        let motion = Motion::of(target, floor::variance(target, 1) / floor::of_correlated(&self.correlation));
+        let high = motion.noise / motion.variance;
+        if !(high > FAST_SHARE || motion.is_noisy()) {
+            return self.judge(state, view, start, expected);
+        }
+        let found = self.judge_noisy(state, view, start, expected, &motion)?;
+        let followed = floor::followed(target, measured, found.delay_s * self.rate_hz, found.amplitude);
+        if followed == 0.0 {
+            return Ok(found);
+        }
+        // The highest frequencies are motion, as measured follows them; only what it does not follow is noise.
+        let motion = Motion { noise: motion.noise * (1.0 - followed), ..motion };
+        state.target_noise = 0.0;
+        let found = if motion.is_noisy() {
+            self.judge_noisy(state, view, start, expected, &motion)?
+        } else {
+            self.judge(state, view, start, expected)?
+        };
+        let share = high * followed;
+        Ok(if share > FAST_SHARE && self.in_time && found.reason.is_none() {
+            found.without_interval(Reason::TooFast { share })
+        } else {
+            found
+        })
+    }
+
+    /// Where the target has noise of its own: at the lowest rate that keeps its motion, so that noise above it is gone, and
+    /// with what is left of the noise taken off the sums.
+    fn judge_noisy(
+        &self,
+        state: &mut AlignmentState,
+        view: &View<'_>,
+        start: usize,
+        expected: Option<f64>,
+        motion: &Motion,
+    ) -> std::result::Result<Tracking, Reason> {
+        let own = &view.target[start - view.origin..start + self.n_samples - view.origin];
+        let most = self.levels.last().map_or(1, |l| l.decimator.factor());
+        let slowest = motion.slowest(own, most);
+        let Some(i) = self.levels.iter().rposition(|l| l.decimator.factor() <= slowest) else {
+            state.target_noise = motion.noise;
+            return self.judge(state, view, start, expected);
+        };
+        let Level { decimator, variance, alignment } = &self.levels[i];
+        let (factor, delay) = (decimator.factor(), decimator.delay());
+        // Of the samples at start + k factor, k from -margin on, those for which the filter is full.
+        let margin = alignment.margin() as isize;
+        let whole = |samples: isize, round: isize| (samples + round).div_euclid(factor as isize);
+        let (origin, end) = (view.origin as isize - start as isize, view.end() as isize - start as isize);
+        let first = whole(origin + delay as isize, factor as isize - 1).max(-margin);
+        let last = whole(end - 1 - delay as isize, 0).min(alignment.n_samples as isize - 1 + margin);
+        let n = (last - first + 1).max(0) as usize;
+        let from = (first * factor as isize - origin - delay as isize) as usize;
+        let [mut target, mut measured] = std::mem::take(&mut state.decimated);
+        decimator.block(&view.target[from..], &mut target[..n]);
+        decimator.block(&view.measured[from..], &mut measured[..n]);
+        let view = View { target: &target[..n], measured: &measured[..n], origin: (first + margin) as usize };
+        let lower = &mut state.levels[i];
+        lower.target_noise = motion.noise * variance;
+        let found = alignment.judge(lower, &view, margin as usize, expected.map(|d| d / factor as f64));
+        state.decimated = [target, measured];
+        found.map(|tracking| Tracking { target_noise: motion.noise.sqrt(), ..tracking })
+    }
+
+    /// Gain and delay with their precision; the state says how noisy the target is.
+    fn judge(
         &self,
         state: &mut AlignmentState,
         view: &View<'_>,
@@ -392,7 +525,8 @@ impl Alignment {
         self.place_target(state, view, start, &support, lag);
         self.kept.spectrum.transform_one(&mut state.scratch, &state.signals.measured, None, &mut state.bins[MEASURED]);
         let products = self.products_in_bins(state);
-        let Some(score) = self.score(&products, lag, &state.weighting.correlation) else {
+        let ratio = TargetNoise::Ratio(&state.weighting.correlation, self.noise_ratio);
+        let Some(score) = score(&products, lag, &ratio) else {
             return;
         };
         let within = support.start - start..support.end - start;
@@ -618,6 +752,8 @@ impl Alignment {
         in_bins: bool,
     ) -> std::result::Result<Fit, Reason> {
         let (low, high) = (tau - room, tau + room);
+        let within = support.start - start..support.end - start;
+        let known = state.target_noise * self.window_moments(&within).0;
         // Where the score is known to be positive (the delay is larger) and negative.
         let (mut below, mut above) = (low, high);
         let mut now = tau;
@@ -626,7 +762,15 @@ impl Alignment {
             self.place_target(state, view, start, support, now);
             let products =
                 if in_bins { self.products_in_bins(state) } else { self.products_in_time(state, start, support) };
-            let Some(score) = self.score(&products, now, &state.weighting.correlation) else {
+            let noise = match (in_bins, known > 0.0) {
+                _ if self.noise_ratio > 0.0 => TargetNoise::Ratio(&state.weighting.correlation, self.noise_ratio),
+                (_, false) => TargetNoise::None,
+                (false, true) => TargetNoise::Known(&self.correlation, known),
+                (true, true) => {
+                    TargetNoise::Known(&self.correlation_in_bins, known * self.kept.spectrum.n_bins() as f64)
+                }
+            };
+            let Some(score) = score(&products, now, &noise) else {
                 return Err(Reason::NoConvergence);
             };
             if score.value > 0.0 {
@@ -654,13 +798,14 @@ impl Alignment {
                 let Products { yy, yv, vv, oy, ov, oo } = products;
                 // The target is y - step y' at the delay found, and the best gain moves with it.
                 let (along, energy) = (oy - step * ov, yy - 2.0 * step * yv + step * step * vv);
-                let gain = score.gain * along / oy * yy / energy;
+                let gain = score.gain * along / oy * (yy - score.own) / (energy - score.own);
                 return Ok(Fit {
                     tau: now + step,
                     step,
                     gain,
                     products,
                     clean: score.clean,
+                    noise: score.own,
                     residual: (oo - 2.0 * gain * along + gain * gain * energy).max(0.0),
                     goodness: None,
                 });
@@ -747,52 +892,6 @@ impl Alignment {
         if let Some(window) = &self.window {
             taper(samples, &window[within.clone()]);
         }
-    }
-
-    /// The derivative of the objective with respect to the delay, up to a positive factor, at `tau` and the best gain.
-    fn score(&self, p: &Products, tau: f64, correlation: &[f64; NODES]) -> Option<Score> {
-        let correlate = |a: &[f64; NODES], b: &[f64; NODES]| -> f64 {
-            let terms = (0..NODES).flat_map(|i| (0..NODES).map(move |j| (i, j)));
-            terms.map(|(i, j)| a[i] * b[j] * correlation[i.abs_diff(j)]).sum()
-        };
-        let taps = (self.noise_ratio > 0.0).then(|| Taps::at(fraction(tau).1));
-        let (gain, noise, share) = if let Some(taps) = &taps {
-            // Noise variances of measured over target; what interpolation leaves of the latter.
-            let lambda = 1.0 / (self.noise_ratio * self.noise_ratio);
-            let g = correlate(&taps.value, &taps.value);
-            let difference = p.yy * lambda - g * p.oo;
-            // The positive root of g oy K^2 + (lambda yy - g oo) K - lambda oy = 0.
-            let root = (difference * difference + 4.0 * g * lambda * p.oy * p.oy).sqrt();
-            let gain = if difference > 0.0 {
-                2.0 * lambda * p.oy / (difference + root)
-            } else {
-                (root - difference) / (2.0 * g * p.oy)
-            };
-            let residual = p.oo - 2.0 * gain * p.oy + gain * gain * p.yy;
-            (gain, residual.max(0.0) / (lambda + gain * gain * g), g)
-        } else {
-            (p.oy / p.yy, 0.0, 0.0)
-        };
-        let mut clean = *p;
-        let mut pull = 0.0;
-        if let Some(taps) = &taps
-            && noise > 0.0
-        {
-            let cross = correlate(&taps.value, &taps.slope);
-            clean.yy -= noise * share;
-            clean.yv -= noise * cross;
-            clean.vv -= noise * correlate(&taps.slope, &taps.slope);
-            if clean.vv * clean.yy <= clean.yv * clean.yv {
-                clean.vv = p.vv;
-            }
-            // Interpolated noise is smaller between samples than on them; the objective does not reward that.
-            pull = noise * gain * cross;
-        }
-        // d/dtau of -|o - K y|^2 / 2 is -K <o - K y, y'>: with y' the slope in time, a delay larger than tau makes it positive.
-        let value = -(p.ov - gain * p.yv) - pull;
-        let slope = gain * (clean.vv - clean.yv * clean.yv / clean.yy);
-        let usable = gain > 0.0 && slope > 0.0 && slope.is_finite() && value.is_finite();
-        usable.then_some(Score { value, slope, gain, clean })
     }
 
     /// measured becomes measured less the fit; returns which share of it the fit explains, 1 - sum e^2 / sum (o - mean)^2.
@@ -981,7 +1080,7 @@ impl Alignment {
             sums::step_energy(velocity) <= HIGH_SHARE * share * share * sums::energy(velocity)
         };
         let mut lowered = match (&self.low, low) {
-            (Some(plan), Some(state)) if slow(plan) => Some((plan, state)),
+            (Some(plan), Some(state)) if plan.always || slow(plan) => Some((plan, state)),
             _ => None,
         };
         let window = match &lowered {
@@ -989,11 +1088,11 @@ impl Alignment {
             None => self.window.as_deref(),
         };
         let (grid, scratch, judged, [e, y, v]) = match &mut lowered {
-            Some((plan, LowState { scratch, averages })) => {
-                for (signal, averages) in [&*measured, &*shifted, &*slope].into_iter().zip(&mut *averages) {
-                    sums::block_means(signal, plan.grid.step, averages);
+            Some((plan, LowState { scratch, fewer })) => {
+                for (signal, fewer) in [&*measured, &*shifted, &*slope].into_iter().zip(&mut *fewer) {
+                    plan.grid.shorten(signal, fewer);
                 }
-                (&plan.grid, scratch, plan.grid.averaged(&within), averages.each_mut().map(|a| a.as_mut_slice()))
+                (&plan.grid, scratch, plan.grid.shortened(&within), fewer.each_mut().map(|a| a.as_mut_slice()))
             }
             None => (&self.kept, scratch, within.clone(), [&mut measured[..], &mut shifted[..], &mut slope[..]]),
         };
@@ -1045,10 +1144,13 @@ impl Alignment {
             bins_per_piece: (folded * fourths / (window_power * window_power)).max(1.0),
             scale: 0.5 * if folded_up { window_power } else { folded },
         };
-        let noisy_target = (self.noise_ratio > 0.0).then(|| NoisyTarget {
-            weights: &weighting.weights,
-            share: fit.gain / (self.noise_ratio.powi(-2) + fit.gain * fit.gain),
-        });
+        let noisy_target = if self.noise_ratio > 0.0 {
+            let share = fit.gain / (self.noise_ratio.powi(-2) + fit.gain * fit.gain);
+            Some(NoisyTarget { weights: Some(&weighting.weights), share })
+        } else {
+            let share = fit.gain * (fit.noise / fit.residual).min(1.0 / (fit.gain * fit.gain));
+            (fit.noise > 0.0).then_some(NoisyTarget { weights: None, share })
+        };
         let correction = grid.correction.as_deref();
         let first = spectrum.first();
         let mut spread =
@@ -1119,12 +1221,138 @@ struct Averaged {
     growth: f64,
 }
 
+/// What is known of the noise on the target.
+enum TargetNoise<'a> {
+    None,
+    /// How it correlates between samples, and its energy in the products.
+    Known(&'a [f64; NODES], f64),
+    /// The same, and its standard deviation over that of the noise on measured.
+    Ratio(&'a [f64; NODES], f64),
+}
+
 /// A score and what goes with it.
 struct Score {
     value: f64,
     slope: f64,
     gain: f64,
     clean: Products,
+    /// The energy of the target's own noise in yy.
+    own: f64,
+}
+
+/// The derivative of the objective with respect to the delay, up to a positive factor, at `tau` and the best gain.
+fn score(p: &Products, tau: f64, target_noise: &TargetNoise<'_>) -> Option<Score> {
+    let taps = Taps::at(fraction(tau).1);
+    let correlate = |correlation: &[f64; NODES], a: &[f64; NODES], b: &[f64; NODES]| -> f64 {
+        let terms = (0..NODES).flat_map(|i| (0..NODES).map(move |j| (i, j)));
+        terms.map(|(i, j)| a[i] * b[j] * correlation[i.abs_diff(j)]).sum()
+    };
+    let mut clean = *p;
+    let (gain, noise, correlation) = match *target_noise {
+        TargetNoise::None => (p.oy / p.yy, 0.0, None),
+        TargetNoise::Known(correlation, noise) => {
+            (p.oy / (p.yy - noise * correlate(correlation, &taps.value, &taps.value)), noise, Some(correlation))
+        }
+        TargetNoise::Ratio(correlation, ratio) => {
+            // Noise variances of measured over target; what interpolation leaves of the latter.
+            let lambda = 1.0 / (ratio * ratio);
+            let g = correlate(correlation, &taps.value, &taps.value);
+            let difference = p.yy * lambda - g * p.oo;
+            // The positive root of g oy K^2 + (lambda yy - g oo) K - lambda oy = 0.
+            let root = (difference * difference + 4.0 * g * lambda * p.oy * p.oy).sqrt();
+            let gain = if difference > 0.0 {
+                2.0 * lambda * p.oy / (difference + root)
+            } else {
+                (root - difference) / (2.0 * g * p.oy)
+            };
+            let residual = p.oo - 2.0 * gain * p.oy + gain * gain * p.yy;
+            (gain, residual.max(0.0) / (lambda + gain * gain * g), Some(correlation))
+        }
+    };
+    let mut own = 0.0;
+    if let Some(correlation) = correlation
+        && noise > 0.0
+    {
+        own = noise * correlate(correlation, &taps.value, &taps.value);
+        clean.yy -= own;
+        // Interpolated noise is smaller between samples than on them; the objective does not reward that.
+        clean.yv -= noise * correlate(correlation, &taps.value, &taps.slope);
+        clean.vv -= noise * correlate(correlation, &taps.slope, &taps.slope);
+        if clean.vv * clean.yy <= clean.yv * clean.yv {
+            clean.vv = p.vv;
+        }
+    }
+    // d/dtau of -|o - K y|^2 / 2 is -K <o - K y, y'>: with y' the slope in time, a delay larger than tau makes it positive.
+    let value = gain * clean.yv - p.ov;
+    let slope = gain * (clean.vv - clean.yv * clean.yv / clean.yy);
+    let usable = gain > 0.0 && slope > 0.0 && slope.is_finite() && value.is_finite();
+    usable.then_some(Score { value, slope, gain, clean, own })
+}
+
+/// The bins that a configuration keeps. What it does to the samples is done here, over those that are judged.
+fn spectrum_config(n_samples: usize, rate_hz: f64, config: &EvaluatorConfig) -> SpectrumConfig {
+    let EvaluatorConfig { data_decimation, frequency_decimation, band_hz, .. } = *config;
+    let (window, detrend) = (Window::Boxcar, Detrend::None);
+    SpectrumConfig { n_samples, rate_hz, data_decimation, frequency_decimation, window, detrend, band_hz }
+}
+
+/// How a target moves in a window, and the noise that is its own.
+#[derive(Debug, Clone, Copy)]
+struct Motion {
+    n: f64,
+    /// Of the noise, a sample.
+    noise: f64,
+    /// Of the samples about their mean, and of the steps from one to the next, less what noise adds.
+    variance: f64,
+    steps: f64,
+}
+
+impl Motion {
+    fn of(target: &[f64], noise: f64) -> Self {
+        let n = target.len() as f64;
+        let variance = sums::spread(target, sums::sum(target) / n) / n - noise;
+        Self { n, noise, variance: variance.max(0.0), steps: (sums::step_energy(target) / n - 2.0 * noise).max(0.0) }
+    }
+
+    /// Whether the noise's bias counts beside the standard deviation that as much noise on measured gives. Of the delay:
+    /// sigma^2 max(sum h h') / V over sqrt(2) sigma / sqrt(n V), V the mean square of a step; of the gain alike.
+    fn is_noisy(&self) -> bool {
+        const PULL: f64 = 0.25;
+        let per_std = (self.noise * self.n).sqrt();
+        per_std * PULL > NOISY_SHARE * self.steps.sqrt() || per_std * 0.7 > NOISY_SHARE * self.variance.sqrt()
+    }
+
+    /// The largest power of two, up to `most`, of which the rate over eight times it lies above all that counts: what holds a
+    /// hundredth of the energy of velocity, and stands out of the noise.
+    fn slowest(&self, target: &[f64], most: usize) -> usize {
+        // The differences of samples s apart are largest at the rate over 2 s, five times what white noise of that energy gives.
+        let (mut speeds, mut total, mut n) = ([0.0; MAX_SCALES], 0.0, 0);
+        for (k, speed) in speeds.iter_mut().enumerate() {
+            let scale = 2 << k;
+            if 16 * scale > target.len() {
+                break;
+            }
+            let (found, samples) = floor::sampled_variance(target, scale);
+            let chance = 3.0 * self.noise * (2.0 / samples).sqrt();
+            let excess = if found - self.noise > chance { found - self.noise } else { 0.0 };
+            *speed = (std::f64::consts::PI / scale as f64).powi(2) * excess / 5.0;
+            total += *speed;
+            n = k + 1;
+        }
+        // A factor P needs the scales up to 4 P to hold nothing.
+        let mut factor = 1;
+        let mut above = speeds[0];
+        for k in 1..n {
+            above += speeds[k];
+            if above > SLOW_SHARE * total || 2 * factor > most {
+                break;
+            }
+            if k >= 2 {
+                factor *= 2;
+            }
+        }
+        factor
+    }
 }
 
 fn taper(samples: &mut [f64], window: &[f64]) {

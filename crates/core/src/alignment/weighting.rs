@@ -35,17 +35,24 @@ impl Weighting {
 
     /// What follows from the weights.
     pub(super) fn refresh(&mut self, correction: Option<&[f64]>, cosines: &[f64]) {
-        let mut sums = [0.0; NODES];
         for (k, (weight, factor)) in self.weights.iter().zip(&mut self.factors).enumerate() {
             *factor = weight.sqrt() * correction.map_or(1.0, |c| c[k]);
-            let (mut now, mut next) = (*weight, weight * cosines[k]);
-            for sum in &mut sums {
-                *sum += now;
-                (now, next) = (next, 2.0 * cosines[k] * next - now);
-            }
         }
-        self.correlation = sums.map(|s| s / sums[0]);
+        self.correlation = correlation(self.weights.iter().copied().zip(cosines.iter().copied()));
     }
+}
+
+/// sum W_k cos(l omega_k) / sum W_k from weights and cosines.
+pub(super) fn correlation(bins: impl Iterator<Item = (f64, f64)>) -> [f64; NODES] {
+    let mut sums = [0.0; NODES];
+    for (weight, cosine) in bins {
+        let (mut now, mut next) = (weight, weight * cosine);
+        for sum in &mut sums {
+            *sum += now;
+            (now, next) = (next, 2.0 * cosine * next - now);
+        }
+    }
+    sums.map(|s| s / sums[0])
 }
 
 /// Keeps (|Y_k|^2 + r^2 |O_k|^2) / 2, r the noise ratio, and |O_k - K Y_k|^2. Noise that lifts the one lifts or lowers the

@@ -1,0 +1,149 @@
+//! Noise that is the target's own, by what its highest frequencies hold and measured does not follow.
+//!
+//! ```text
+//! d_i = sum_j (-1)^j C(8, j) x_(i + s j),   |D(w)|^2 = (2 sin(w s / 2))^16,   E d^2 = 12870 sigma^2 for white noise
+//! ```
+//!
+//! At a tenth of the rate over s the differences of eighth order pass 1e-8 of the energy that white noise of the same energy
+//! leaves, so a motion does not count, and nothing leaks from the ends of a window as it does from a transform.
+
+use pulp::{Arch, NullaryFnOnce};
+
+/// Order of the differences.
+const ORDER: usize = 8;
+/// (-1)^j C(8, j)
+const BINOMIAL: [f64; ORDER + 1] = [1.0, -8.0, 28.0, -56.0, 70.0, -56.0, 28.0, -8.0, 1.0];
+/// sum C(8, j)^2
+const SQUARES: f64 = 12870.0;
+/// Share of the differences that are independent.
+const INDEPENDENT: f64 = 0.13;
+/// Samples of a part.
+const PART: usize = 128;
+/// Samples that are compared with measured at most.
+const COMPARED: usize = 1 << 14;
+/// Two channels' differences are alike from this correlation on, and this many standard deviations of chance.
+const ALIKE: f64 = 0.15;
+const CLEAR: f64 = 5.0;
+/// At each lag differences far above chance are found again at a neighbour: the shift between samples costs up to this.
+const BETWEEN: f64 = 1.5;
+
+/// Mean square of the differences of samples `stride` apart, over sum C^2: the variance of white noise.
+pub(crate) fn variance(samples: &[f64], stride: usize) -> f64 {
+    struct Differences<'a>(&'a [f64], usize);
+    impl NullaryFnOnce for Differences<'_> {
+        type Output = f64;
+
+        #[inline(always)]
+        fn call(self) -> f64 {
+            const LANES: usize = 16;
+            let Self(samples, stride) = self;
+            let n = samples.len() - ORDER * stride;
+            let terms: [&[f64]; ORDER + 1] = std::array::from_fn(|j| &samples[j * stride..j * stride + n]);
+            let mut lanes = [0.0; LANES];
+            let mut at = 0;
+            while at + LANES <= n {
+                let x: [&[f64; LANES]; ORDER + 1] =
+                    std::array::from_fn(|j| terms[j][at..at + LANES].try_into().expect("LANES of them"));
+                for i in 0..LANES {
+                    let d = x[0][i] + x[8][i] - 8.0 * (x[1][i] + x[7][i]) + 28.0 * (x[2][i] + x[6][i])
+                        - 56.0 * (x[3][i] + x[5][i])
+                        + 70.0 * x[4][i];
+                    lanes[i] += d * d;
+                }
+                at += LANES;
+            }
+            let rest: f64 = (at..n).map(|i| difference(|j| terms[j][i]).powi(2)).sum();
+            (lanes.iter().sum::<f64>() + rest) / (n as f64 * SQUARES)
+        }
+    }
+    if samples.len() <= ORDER * stride { 0.0 } else { Arch::new().dispatch(Differences(samples, stride)) }
+}
+
+/// The same from a part of the differences, and how many independent ones there are.
+pub(crate) fn sampled_variance(samples: &[f64], stride: usize) -> (f64, f64) {
+    let length = PART.max(ORDER * stride + PART / 2);
+    let every = (4 * (length - ORDER * stride)).max(length / 2);
+    let (mut sum, mut n) = (0.0, 0.0);
+    let mut at = 0;
+    while at + length <= samples.len() {
+        let count = (length - ORDER * stride) as f64;
+        sum += count * variance(&samples[at..at + length], stride);
+        n += count;
+        at += every;
+    }
+    if n == 0.0 { (variance(samples, stride), INDEPENDENT * samples.len() as f64) } else { (sum / n, INDEPENDENT * n) }
+}
+
+fn difference(x: impl Fn(usize) -> f64) -> f64 {
+    BINOMIAL.iter().enumerate().map(|(j, c)| c * x(j)).sum()
+}
+
+/// What the variance is of noise that correlates so between samples, over that of white noise.
+pub(crate) fn of_correlated(correlation: &[f64]) -> f64 {
+    let product = |l: usize| (0..=ORDER.saturating_sub(l)).map(|j| BINOMIAL[j] * BINOMIAL[j + l]).sum::<f64>();
+    let sum = (1..=ORDER).map(|l| product(l) * correlation.get(l).copied().unwrap_or(0.0)).sum::<f64>();
+    1.0 + 2.0 * sum / SQUARES
+}
+
+/// The share of the target's differences that measured follows at about `lag` samples and a gain: motion, not noise.
+/// `target` and `measured` are the same stretch.
+pub(crate) fn followed(target: &[f64], measured: &[f64], lag: f64, gain: f64) -> f64 {
+    let n = target.len().min(COMPARED);
+    let from = (target.len() - n) / 2;
+    let base = lag.floor() as isize;
+    let margin = base.unsigned_abs() + 2;
+    if n < 2 * margin + 8 * ORDER {
+        return 0.0;
+    }
+    let d = |x: &[f64], i: usize| difference(|j| x[i + j]);
+    let (mut own, mut other, mut products) = (0.0, 0.0, [0.0; 4]);
+    for i in from + margin..from + n - margin - ORDER {
+        let x = d(target, i);
+        own += x * x;
+        for (k, product) in products.iter_mut().enumerate() {
+            let y = d(measured, i.saturating_add_signed(base + k as isize - 1));
+            *product += x * y;
+            other += 0.25 * y * y;
+        }
+    }
+    let most = products.iter().fold(0.0, |m: f64, p| m.max(p.abs()));
+    let chance = CLEAR / (INDEPENDENT * n as f64).sqrt();
+    if most > (own * other).sqrt() * ALIKE.max(chance) { (BETWEEN * most / (gain * own)).min(1.0) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn noise(n: usize, mut seed: u64) -> Vec<f64> {
+        let mut uniform = move || {
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (seed >> 11) as f64 / (1u64 << 53) as f64
+        };
+        (0..n).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect()
+    }
+
+    #[test]
+    fn white_noise_on_a_motion_is_found_and_the_motion_is_not() {
+        let motion: Vec<f64> = (0..20_000).map(|i| 50.0 * (0.1 * f64::from(i)).sin()).collect();
+        let noisy: Vec<f64> = motion.iter().zip(noise(20_000, 3)).map(|(x, e)| x + 0.5 * e).collect();
+        for stride in [1, 2] {
+            assert!((variance(&noisy, stride) / 0.25 - 1.0).abs() < 0.1, "{stride}");
+        }
+        assert!(variance(&motion, 1) < 1e-12);
+        // The sums in lanes are those written out.
+        let plain: f64 = (0..noisy.len() - 8).map(|i| difference(|j| noisy[i + j]).powi(2)).sum();
+        assert!((variance(&noisy, 1) * SQUARES * (noisy.len() - 8) as f64 / plain - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_high_tone_that_measured_follows_is_motion_between_samples_too() {
+        for shift in [0.0, 0.3, 0.5, 0.9] {
+            let tone = |i: f64| (2.6 * i).sin() + 0.7 * (2.9 * i).cos();
+            let target: Vec<f64> = (0..4096).map(|i| tone(f64::from(i))).collect();
+            let measured: Vec<f64> = (0..4096).map(|i| 0.9 * tone(f64::from(i) - 7.0 - shift)).collect();
+            assert!(followed(&target, &measured, 7.0 + shift, 0.9) > 0.5, "{shift}");
+            assert_eq!(followed(&noise(4096, 1), &noise(4096, 2), 7.0 + shift, 0.9), 0.0);
+        }
+    }
+}
