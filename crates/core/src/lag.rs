@@ -28,7 +28,7 @@ const LONGEST: usize = 1 << 20;
 const FARTHER: usize = 4;
 const WELL_FOLLOWED: f64 = 0.98;
 /// and so little of what a correlation leaves must be left there for it to be the place.
-const LEFT: f64 = 0.5;
+const LEFT: f64 = 0.2;
 /// Fewest cycles of the target in the window: more than half a wave, whose delay cannot be told from an offset.
 const MIN_CYCLES: f64 = 0.6;
 /// Peaks that are looked at: a tone has as many as it has turns within reach.
@@ -123,8 +123,7 @@ struct Correlated {
     step: usize,
     /// Cycles that the target moves through.
     cycles: f64,
-    /// The lowest and the highest of them, of lags longer than a given one.
-    lowest: f64,
+    /// The highest of them, of lags from a given one on.
     highest: f64,
 }
 
@@ -169,13 +168,14 @@ impl Search {
         }
         let mut found =
             Peaks { peaks: [Peak::default(); MAX_PEAKS], n_peaks: 0, step: near.step, reach, cycles: near.cycles };
-        found.collect(&state.correlations[..2 * near.lags + 1], near, expected);
-        let opposite = -near.lowest > near.highest + OPPOSITE_MARGIN;
+        let correlations = &state.correlations[..2 * near.lags + 1];
+        let lowest = found.collect(correlations, near, expected);
         let highest = found.first().correlation;
+        let opposite = -lowest > highest + OPPOSITE_MARGIN;
         if opposite || highest < WELL_FOLLOWED {
             // Half a cycle out of reach looks like a sign, and a whole one like the delay: what lies farther away tells.
             let farther = (FARTHER.min(near.step) * reach).min(2 * self.n_samples / 5) / self.max_step * self.max_step;
-            let left = 1.0 - highest.max(if opposite { -near.lowest } else { 0.0 });
+            let left = 1.0 - highest.max(if opposite { -lowest } else { 0.0 });
             if farther > reach
                 && self.correlate(state, view, start, farther, reach).is_ok_and(|far| 1.0 - far.highest < LEFT * left)
             {
@@ -191,7 +191,7 @@ impl Search {
         Ok(found)
     }
 
-    /// Correlates at lags of up to `reach` samples to either side; the lowest and highest are of those from `inner` on.
+    /// Correlates at lags of up to `reach` samples to either side; the highest is of those from `inner` on.
     fn correlate(
         &self,
         state: &mut SearchState,
@@ -247,14 +247,14 @@ impl Search {
         let round_off = 1e-13 * sums::energy(target);
         let (mut sum, mut squares): (f64, f64) = target[..n].iter().fold((0.0, 0.0), |(s, q), v| (s + v, q + v * v));
         let mut moved = false;
-        let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
+        let mut highest = f64::NEG_INFINITY;
         for k in 0..correlations.len() {
             let own = squares - sum * sum / n as f64;
             let comparable = own > round_off && spread > 0.0;
             moved |= comparable;
             correlations[k] = if comparable { correlations[k] / (own.sqrt() * spread.sqrt()) } else { 0.0 };
             if k.abs_diff(lags) * step >= inner {
-                (lowest, highest) = (lowest.min(correlations[k]), highest.max(correlations[k]));
+                highest = highest.max(correlations[k]);
             }
             if k + 1 < correlations.len() {
                 let (leaves, enters) = (target[k], target[k + n]);
@@ -265,19 +265,25 @@ impl Search {
         if !moved {
             return Err(Reason::Still);
         }
-        Ok(Correlated { lags, step, cycles, lowest, highest })
+        Ok(Correlated { lags, step, cycles, highest })
     }
 }
 
 impl Peaks {
-    /// Takes the peaks of what stands at `correlations`, highest first.
-    fn collect(&mut self, correlations: &[f64], searched: Correlated, expected: Option<f64>) {
+    /// Takes the peaks of what stands at `correlations`, highest first; returns how low the lowest trough is.
+    fn collect(&mut self, correlations: &[f64], searched: Correlated, expected: Option<f64>) -> f64 {
         let Correlated { lags, step, .. } = searched;
+        let mut lowest = 0.0_f64;
         let mut nearest: Option<Peak> = None;
         for k in 0..correlations.len() {
             let here = correlations[k];
-            let before = if k == 0 { f64::NEG_INFINITY } else { correlations[k - 1] };
-            let after = if k + 1 == correlations.len() { f64::NEG_INFINITY } else { correlations[k + 1] };
+            let outside = f64::NEG_INFINITY;
+            let before = if k == 0 { outside } else { correlations[k - 1] };
+            let after = if k + 1 == correlations.len() { outside } else { correlations[k + 1] };
+            if here <= before && here <= after {
+                let inside = before.is_finite() && after.is_finite();
+                lowest = lowest.min(if inside { -summit(-before, -here, -after).1 } else { here });
+            }
             if here < before || here <= after || here.is_nan() {
                 continue;
             }
@@ -303,6 +309,7 @@ impl Peaks {
             self.peaks[at] = peak;
             self.n_peaks = at + 1;
         }
+        lowest
     }
 
     /// Inserts in order, dropping the lowest.

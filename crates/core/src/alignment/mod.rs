@@ -58,6 +58,8 @@ const HIGH_SHARE: f64 = 0.05;
 /// How often another turn is taken for the likeliest, and by how much of log-likelihood it must be that.
 const MAX_REFERENCES: usize = 3;
 const LEAST_GAIN: f64 = 1.0;
+/// Noise changes over time where it meets the difference of two fits with this many times the variance of steady noise.
+const UNSTEADY: f64 = 1.5;
 /// So much less likely, were the noise white, it is less likely in any noise.
 const CLEAR_ODDS: f64 = 1e3 * LOG_ODDS;
 /// The bias of noise on the target may be this share of the standard deviation.
@@ -223,17 +225,20 @@ struct Odds {
     excess: f64,
     /// sum e_least^2 (e - e_least)^2
     variance: f64,
+    /// sum (e - e_least)^2
+    distance: f64,
 }
 
 impl Odds {
     fn of(residual: &[f64], least: &[f64]) -> Self {
-        let (mut excess, mut variance) = (0.0, 0.0);
+        let (mut excess, mut variance, mut distance) = (0.0, 0.0, 0.0);
         for (e, least) in residual.iter().zip(least) {
             let d = e - least;
             excess += d * (e + least);
             variance += (least * d) * (least * d);
+            distance += d * d;
         }
-        Self { excess, variance }
+        Self { excess, variance, distance }
     }
 }
 
@@ -631,8 +636,8 @@ impl Alignment {
     /// exp([`LOG_ODDS`]). `least` has the least residual.
     ///
     /// With the noise whitened by an autoregression of the likeliest one's residual, D = sum e^2 - sum e_best^2, the odds are
-    /// exp(n/2 log(sum e^2 / sum e_best^2)), or exp(D^2 / 2 V), V = sum e_best^2 (e - e_best)^2, where the noise changes over
-    /// time; the lower count. Over bins, the residual's correlation tells how many samples are independent.
+    /// exp(n/2 log(sum e^2 / sum e_best^2)), or exp(D^2 / 2 V), V = sum e_best^2 (e - e_best)^2, where V is larger than steady
+    /// noise makes it. Over bins, the residual's correlation tells how many samples are independent.
     fn keep_equal(
         &self,
         state: &mut AlignmentState,
@@ -678,8 +683,9 @@ impl Alignment {
                     (likelier, most) = (Some(*f), odds.excess);
                 }
                 let excess = odds.excess.max(0.0);
-                let of_spectrum = 0.5 * weight * ((all + excess) / all).ln();
-                of_spectrum < LOG_ODDS || 0.5 * excess * excess / odds.variance < LOG_ODDS
+                let steady = 0.5 * weight * ((all + excess) / all).ln();
+                let changing = odds.variance > UNSTEADY * all / weight * odds.distance;
+                steady < LOG_ODDS || (changing && 0.5 * excess * excess / odds.variance < LOG_ODDS)
             });
             match likelier {
                 Some(fit) => best = fit,
