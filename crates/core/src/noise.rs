@@ -292,9 +292,11 @@ pub(crate) struct Sampling {
 #[derive(Debug, Clone, Copy, Default)]
 struct Cell {
     n: f64,
-    /// |U|^2 / |A|^2 of gain and delay.
+    /// |U|^2 / |A|^2 of gain and delay, and |U|^2.
     gain: [f64; LANES],
     delay: [f64; LANES],
+    gain_as_is: [f64; LANES],
+    delay_as_is: [f64; LANES],
     leverage: [f64; LANES],
     target: [f64; LANES],
     /// |E|^2 |A|^2
@@ -414,6 +416,8 @@ impl<'a> Spread<'a> {
         let (g, d) = (gain[0] * y + gain[1] * velocity, delay[0] * y + delay[1] * velocity);
         cell.gain[0] += 0.5 * g * g / whitening;
         cell.delay[0] += 0.5 * d * d / whitening;
+        cell.gain_as_is[0] += 0.5 * g * g;
+        cell.delay_as_is[0] += 0.5 * d * d;
         cell.leverage[0] +=
             0.5 * (leverage[0] * y * y + 2.0 * leverage[1] * y * velocity + leverage[2] * velocity * velocity);
         cell.target[0] += 0.5 * y * y;
@@ -435,7 +439,7 @@ impl<'a> Spread<'a> {
         let cells_per_block = ((2.0 * half / pieces_per_cell).round() as usize).clamp(1, self.cells.len());
         // A last block that is not full joins the one before it.
         let n_blocks = (self.cells.len() / cells_per_block).max(1);
-        let (mut gain, mut delay) = (Variance::default(), Variance::default());
+        let [mut gain, mut delay, mut gain_as_is, mut delay_as_is] = [Variance::default(); 4];
         for b in 0..n_blocks {
             let to = if b + 1 == n_blocks { self.cells.len() } else { (b + 1) * cells_per_block };
             let cells = &self.cells[b * cells_per_block..to];
@@ -443,11 +447,18 @@ impl<'a> Spread<'a> {
             let n = sum(|c| c.n);
             let expected = n * window_power - scale * sum(|c| total(&c.leverage));
             // A block of which the fit leaves less than a tenth of a bin says nothing of the noise.
-            let density = sum(|c| total(&c.whitened)) / expected.max(0.1 * window_power);
+            let per_bin = 1.0 / expected.max(0.1 * window_power);
             let pieces = (expected / window_power / bins_per_piece).max(0.1);
+            let density = per_bin * sum(|c| total(&c.whitened));
             gain.add(scale * sum(|c| total(&c.gain)), density, pieces);
             delay.add(scale * sum(|c| total(&c.delay)), density, pieces);
+            let density = per_bin * sum(|c| total(&c.residual));
+            gain_as_is.add(scale * sum(|c| total(&c.gain_as_is)), density, pieces);
+            delay_as_is.add(scale * sum(|c| total(&c.delay_as_is)), density, pieces);
         }
+        // An autoregression that has a tone to describe tilts what lies far from it.
+        let larger = |a: Variance, b: Variance| if b.value > a.value { b } else { a };
+        let (gain, delay) = (larger(gain, gain_as_is), larger(delay, delay_as_is));
         let Changes { concentration, .. } = self.changes;
         let gain = gain.changed(self.changes.gain, self.changes.gain_uncertainty, concentration);
         let delay = delay.changed(self.changes.delay, self.changes.delay_uncertainty, concentration);
@@ -566,8 +577,11 @@ impl Sink for Spread<'_> {
             let vv = (vr[i] * vr[i] + vi[i] * vi[i]) * squared[i];
             let form = |[a, b, c]: [f64; 3]| a * yy + b * yv + c * vv;
             let noise = weight[i] * weight[i] / whitening[i];
-            cell.gain[i] += noise * form(gain);
-            cell.delay[i] += noise * form(delay);
+            let (gain, delay) = (form(gain), form(delay));
+            cell.gain[i] += noise * gain;
+            cell.delay[i] += noise * delay;
+            cell.gain_as_is[i] += weight[i] * weight[i] * gain;
+            cell.delay_as_is[i] += weight[i] * weight[i] * delay;
             cell.leverage[i] += weight[i] * form(leverage);
             // What is not in the fit, for it is mostly noise, is not asked whether the residual follows it.
             cell.target[i] += if weight[i] > 0.0 { yy } else { 0.0 };
