@@ -315,6 +315,7 @@ def _factor_settings(factors: Factors | None) -> dict[str, Any]:
             # moving windows are evaluated with these, too
             "reference_data_decimation": reference.data_decimation,
             "reference_frequency_decimation": reference.frequency_decimation,
+            "windowed": None if factors.windowed is None else factors.windowed.to_dict(),
         }
     }
 

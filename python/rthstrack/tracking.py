@@ -285,6 +285,8 @@ class FrequencyResponse(_Result):
     `target_psd`, `measured_psd` are one-sided densities in unit^2/Hz.
     `gain_std`, `delay_std_s` are standard errors; `gain_interval`, `delay_interval_s` (n_bins, 2) hold the lower and
     upper ends of 95 % intervals. NaN where nothing supports them, see `frequency_response`.
+    `align_s` is the delay at which segments were aligned; where it was to be found and could not be had it is 0, and
+    `unaligned` says why.
     """
 
     frequency_hz: NDArray[np.float64]
@@ -306,6 +308,7 @@ class FrequencyResponse(_Result):
     align_s: float
     dispersion: bool
     rate_hz: float
+    unaligned: str = ""
 
     def _columns(self) -> dict[str, Any]:
         names = ("frequency_hz", "gain", "phase_rad", "delay_s", "coherence", "target_psd", "measured_psd")
@@ -639,7 +642,7 @@ def frequency_response(
     overlap: float = 0.5,
     window: str = "hann",
     detrend: str = "mean",
-    align_s: float = 0.0,
+    align_s: float | None = None,
     dispersion: bool = False,
 ) -> FrequencyResponse:
     """Gain, phase, delay and coherence of measured over target at every frequency, by Welch's method, with intervals.
@@ -665,12 +668,11 @@ def frequency_response(
     t, m = _single(target, measured)
     rate_hz = _number("rate_hz", rate_hz)
     segment = None if segment_s is None else _number("segment_s", segment_s)
-    share, align_s = _number("overlap", overlap), _number("align_s", align_s)
-    settings = (segment, share, window, detrend, align_s, bool(dispersion))
-    curves, uncertainty, n_segments, length_s = _core.frequency_response(t, m, rate_hz, settings)
-    return FrequencyResponse(
-        *curves, *uncertainty, length_s, share, n_segments, window, detrend, align_s, bool(dispersion), rate_hz
-    )
+    share, given_s = _number("overlap", overlap), None if align_s is None else _number("align_s", align_s)
+    settings = (segment, share, window, detrend, given_s, bool(dispersion))
+    curves, uncertainty, n_segments, length_s, used_s, why = _core.frequency_response(t, m, rate_hz, settings)
+    about = (length_s, share, n_segments, window, detrend, used_s, bool(dispersion), rate_hz, why)
+    return FrequencyResponse(*curves, *uncertainty, *about)
 
 
 def frequency_slopes(
