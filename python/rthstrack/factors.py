@@ -138,7 +138,7 @@ def choose_factors(
     of this one. Where a phase is so near to half a turn that round-off decides the delay's sign, no pair qualifies.
 
     What Q changes comes from the record's two ends, most of all. Where Q is chosen, could be larger, and no window or
-    no detrending is set, `windowed` says what a window with the mean removed would allow, for the cost of one or two more choices.
+    no detrending is set, `windowed` says what a window with the mean removed would allow: one or two more choices.
 
     target, measured: (n_samples,), any one unit; rate_hz: samples a second. tolerance: above 0, below 1.
     data_decimation, frequency_decimation: one of them given stays, and changes are counted from it with the other at 1.
@@ -158,12 +158,17 @@ def choose_factors(
     plan = _plan(len(t), rate := _number("rate_hz", rate_hz), base)
     allowed = _number("tolerance", tolerance)
     reference = dataclasses.replace(base, data_decimation=p or 1, frequency_decimation=q or 1)
-    *chosen, measure, numbers, changes = _choice(_core.choose_factors(plan, t, m, allowed, p, q))
+    chosen_p, chosen_q, amplitude_bound, delay_bound, measure, numbers, changes = _choice(
+        _core.choose_factors(plan, t, m, allowed, p, q)
+    )
     found = Factors(
-        *chosen,
+        chosen_p,
+        chosen_q,
+        amplitude_bound,
+        delay_bound,
         measure,
         allowed,
-        dataclasses.replace(base, data_decimation=chosen[0], frequency_decimation=chosen[1]),
+        dataclasses.replace(base, data_decimation=chosen_p, frequency_decimation=chosen_q),
         _tracking(
             numbers,
             int(changes.n_bins[0]),
@@ -182,7 +187,8 @@ def choose_factors(
 def _choice(found: Any) -> tuple[int, int, float, float, Literal["relative", "phase"], Any, FactorChanges]:
     p, q, amplitude_bound, delay_bound, near_zero, numbers, table = found
     measure: Literal["relative", "phase"] = "phase" if near_zero else "relative"
-    return p, q, amplitude_bound, delay_bound, measure, numbers, FactorChanges(*table, measure)
+    columns: Any = (*table, measure)
+    return p, q, amplitude_bound, delay_bound, measure, numbers, FactorChanges(*columns)
 
 
 def _may_grow(found: Factors) -> bool:
