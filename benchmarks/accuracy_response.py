@@ -229,8 +229,8 @@ def default_table(every_case: list[Case]) -> list[str]:
     lines = [
         "### As it is by default",
         "",
-        f"Pure delays, {SLOPE_DRAWS} draws each of white and AR(1) noise, aligned at the trusted delay of each draw; asked "
-        f"for are {100 * low:.0f} to {100 * high:.0f} % over all bins: "
+        f"Pure delays, {SLOPE_DRAWS} draws each of white and AR(1) noise, aligned at the trusted delay of each draw; "
+        f"asked for are {100 * low:.0f} to {100 * high:.0f} % over all bins: "
         + (f"**missed** by {', '.join(missed)}." if missed else "met.")
         + " Beside it what is held without alignment, and the largest share of the delay that a bin then loses without "
         "noise: it does not depend on the delay.",
