@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import sys
 from dataclasses import FrozenInstanceError
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,9 @@ from rthstrack.errors import SettingError, SignalError
 from rthstrack.factors import prior_bounds
 from rthstrack.studies import Pair, Study, study
 from tolerances import physical, round_off
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "benchmarks"))
+import accuracy_factors
 
 RATE = 200.0
 NEAR_ZERO_RAD = 0.001
@@ -116,6 +120,73 @@ def test_the_table_holds_every_pair() -> None:
     assert len(found.to_frame()) == len(pairs)
     with pytest.raises(FrozenInstanceError):
         found.tolerance = 1.0  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("seeds", [range(k, k + 100) for k in range(0, 600, 100)], ids=lambda r: f"{r[0]} on")
+def test_the_bound_holds_on_hostile_pairs(seeds: range) -> None:
+    found = [accuracy_factors.judge_hostile(seed) for seed in seeds]
+    assert not [f"{f.case.name}, {f.case.kind}: {f.what}" for f in found if not f.kept]
+    # Not by taking P = Q = 1.
+    assert sum(f.larger for f in found) > sum(f.judged for f in found) / 2
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-15, 1e-12])
+def test_a_delay_that_may_have_either_sign_has_no_bound(noise: float) -> None:
+    target, _ = response(0.0)
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        measured = -1.3 * target + noise * target.std() * rng.standard_normal(target.size)
+        found = choose_factors(target, measured, RATE, tolerance=0.002)
+        assert abs(float(found.reference.phase_rad)) > 3.14159
+        assert (found.data_decimation, found.frequency_decimation, found.delay_bound) == (1, 1, 0.0)
+        assert np.isinf(found.changes.delay[1:]).all()
+        assert np.isfinite(found.changes.amplitude[1:]).any()
+
+
+def test_a_target_without_noise_leaves_no_direction_to_unit_weights() -> None:
+    # l = 1 gives bins that hold only round-off the share of what measured's noise is there.
+    n = 4096
+    target = np.sin(2 * np.pi * 40 * np.arange(n) / n)
+    measured = target + 0.1 * np.random.default_rng(2).standard_normal(n)
+    by_power = {
+        power: choose_factors(target, measured, RATE, tolerance=0.05, weight_power=power).changes for power in (1, 2)
+    }
+    assert by_power[1].amplitude[1] > 0.5 > 1e-3 > by_power[2].amplitude[1]
+
+
+def cut_off(n: int = 3000) -> tuple[np.ndarray, np.ndarray]:
+    """A steady motion of many frequencies that neither begins nor ends at rest, and its late copy."""
+    steps = np.arange(60)
+    pulse = np.hanning(60) * np.sin(steps / 5)
+    motion = np.convolve(np.random.default_rng(0).standard_normal(n + 400), pulse, "same") + 0.3
+    return motion[200 : 200 + n], 1.05 * motion[196 : 196 + n]
+
+
+def test_the_window_that_would_allow_a_larger_q_is_said_and_nothing_is_changed(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    target, measured = cut_off()
+    found = choose_factors(target, measured, RATE)
+    windowed = found.windowed
+    assert windowed is not None
+    assert (found.settings.window, found.settings.detrend) == ("boxcar", "none")
+    assert (windowed.window, windowed.detrend) == ("hann", "mean")
+    assert windowed.frequency_decimation > found.frequency_decimation
+    settings = {"window": windowed.window, "detrend": windowed.detrend}
+    own = choose_factors(target, measured, RATE, **settings)
+    assert (own.data_decimation, own.frequency_decimation) == (windowed.data_decimation, windowed.frequency_decimation)
+    assert (own.amplitude_bound, own.delay_bound) == (windowed.amplitude_bound, windowed.delay_bound)
+    assert own.windowed is None, "nothing is left to propose"
+    assert choose_factors(target, measured, RATE, frequency_decimation=2).windowed is None, "Q was given"
+    path = tmp_path / "cut.csv"
+    np.savetxt(path, np.column_stack([np.arange(target.size) / RATE, target, measured]), delimiter=",",
+               header="time (s),target (mm),measured (mm)", comments="", fmt="%.17g")  # fmt: skip
+    status, out, _ = run(capsys, path, "-P", "auto", "-Q", "auto")
+    assert status == 0
+    assert windowed.sentence in " ".join(out.split())
+    (entry,) = json.loads(run(capsys, path, "-P", "auto", "-Q", "auto", "--json")[1])["results"]
+    assert entry["settings"]["chosen_factors"]["windowed"]["frequency_decimation"] == windowed.frequency_decimation
+    assert entry["settings"]["window"] == "boxcar"
 
 
 def test_a_given_factor_stays() -> None:
@@ -271,6 +342,7 @@ def test_the_command_prints_the_choice_and_its_bound(
         "delay_measure": "relative",
         "reference_data_decimation": 1,
         "reference_frequency_decimation": 1,
+        "windowed": None,
     }
     report = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert 'data-setting="chosen_factors · amplitude_bound"' in report

@@ -190,12 +190,72 @@ def test_a_constant_delay_of_whole_samples_needs_no_correction() -> None:
     assert_allclose(r.delay_s[judged], 5 / RATE, rtol=round_off(1, 4096))
 
 
+@pytest.mark.parametrize("delay_s", [0.009, 0.065, -0.2], ids=["9 ms", "65 ms", "-200 ms"])
+def test_segments_are_aligned_at_the_trusted_delay_unless_told_otherwise(delay_s: float) -> None:
+    target = motion(8192)
+    measured = delayed(target, 1.1, delay_s)
+    r, plain = (rthstrack.frequency_response(target, measured, RATE, **s) for s in ({}, {"align_s": 0.0}))
+    trusted = rthstrack.evaluate(target, measured, RATE, estimator="least_squares", detrend="mean")
+    assert (r.align_s, r.unaligned) == (trusted.delay_s, "")
+    assert (plain.align_s, plain.unaligned) == (0.0, "")
+    judged = strong(r)
+    assert_allclose(r.gain[judged], 1.1, rtol=physical(1e-4, "relative"))
+    assert_allclose(r.delay_s[judged], delay_s, rtol=0, atol=physical(5, "us"))
+    # What unaligned segments lose of the delay is a share of it, however short it is.
+    assert np.abs(plain.delay_s / delay_s - 1)[judged].max() > 0.02
+
+
+@pytest.mark.parametrize("kind", ["white", "ar1"])
+@pytest.mark.parametrize("delay_s", [0.009, 0.2])
+def test_intervals_of_what_is_aligned_by_default_cover_the_truth(kind: str, delay_s: float) -> None:
+    target = motion(8192, seed=7)
+    clean = delayed(target, 1.1, delay_s)
+    n_draws, covered = 60, []
+    for noise in noises(kind, 8192, n_draws, seed=3):
+        r = rthstrack.frequency_response(target, clean + 0.01 * clean.std() * noise, RATE)
+        judged = strong(r)
+        for (low, high), truth in ((r.gain_interval[judged].T, 1.1), (r.delay_interval_s[judged].T, delay_s)):
+            covered.append(np.mean((low <= truth) & (truth <= high)))
+    # Some 20 bins of which every second is new, gain and delay: 3.5 standard deviations.
+    assert abs(np.mean(covered) - 0.95) < 3.5 * math.sqrt(0.05 * 0.95 / (20 * n_draws))
+
+
+def test_why_segments_are_not_aligned_is_said() -> None:
+    target = motion(4096)
+    noise = noises("white", 4096, 1)[0]
+    r = rthstrack.frequency_response(target, noise, RATE)
+    trusted = rthstrack.evaluate(target, noise, RATE, estimator="least_squares", detrend="mean")
+    assert math.isnan(float(trusted.delay_s))
+    assert (r.align_s, r.unaligned) == (0.0, trusted.reason)
+    # Two segments of 126 of 256 samples leave no room for 50.
+    wave = np.sin(2 * np.pi * 3 * np.arange(400) / RATE) * np.linspace(0, 1, 400) ** 2
+    short = rthstrack.frequency_response(wave[50:306], wave[:256], RATE, segment_s=126 / RATE, overlap=0.0)
+    assert short.align_s == 0
+    assert short.unaligned.startswith("the record is too short for two segments")
+    assert "\n" not in r.unaligned + short.unaligned
+    assert "unaligned" in r.to_dict()
+
+
+def test_an_assessment_aligns_its_response_at_the_same_delay() -> None:
+    target = motion(8192)
+    noise = 0.01 * target.std() * noises("white", 8192, 1)[0]
+    found = rthstrack.assess(target, delayed(target, 1.1, 0.012) + noise, RATE)
+    alone = rthstrack.frequency_response(found.target, found.measured, RATE)
+    assert found.response is not None
+    assert (found.response.align_s, found.response.unaligned) == (alone.align_s, "")
+    assert np.array_equal(found.response.delay_s, alone.delay_s)
+    lost = rthstrack.assess(target, noise, RATE)
+    assert lost.response is not None
+    if lost.response.align_s == 0:
+        assert lost.response.unaligned.startswith("not determined")
+
+
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 17.0, -17.0, 15.5, None, "late"])
 @pytest.mark.parametrize("call", [rthstrack.frequency_response, rthstrack.frequency_slopes])
 def test_an_alignment_that_leaves_no_record_is_refused(call: Any, value: Any) -> None:
     target = motion(4096)
-    if value is None and call is rthstrack.frequency_slopes:
-        assert call(target, target, RATE, align_s=None).align_s == 0
+    if value is None:
+        assert call(target, target, RATE, align_s=None).align_s == pytest.approx(0, abs=physical(1e-3, "us"))
         return
     with pytest.raises(rthstrack.SettingError, match="align_s") as caught:
         call(target, target, RATE, align_s=value)

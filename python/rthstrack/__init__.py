@@ -16,7 +16,14 @@ from rthstrack.errors import (
     SignalError,
     UnstableError,
 )
-from rthstrack.factors import FactorChanges, Factors, KeyFrequencies, choose_factors, key_frequencies
+from rthstrack.factors import (
+    FactorChanges,
+    Factors,
+    KeyFrequencies,
+    WindowedFactors,
+    choose_factors,
+    key_frequencies,
+)
 from rthstrack.ground_motion import GroundMotion, list_records, read_ground_motion, record, synthetic_ground_motion
 from rthstrack.monitor import Monitor, MonitorSettings, Readings, causal_decimate
 from rthstrack.recording import Channel, Recording, propose_pair, read_recording
@@ -82,6 +89,7 @@ __all__ = [
     "Tracking",
     "UnstableError",
     "VirtualTest",
+    "WindowedFactors",
     "__version__",
     "assess",
     "causal_decimate",

@@ -162,7 +162,7 @@ def evaluate_moving(
     settings: Settings,
 ) -> _Readings: ...
 
-_ResponseSettings = tuple[float | None, float, str, str, float, bool]
+_ResponseSettings = tuple[float | None, float, str, str, float | None, bool]
 
 def frequency_response(
     target: NDArray[Any],
@@ -170,7 +170,12 @@ def frequency_response(
     rate_hz: float,
     settings: _ResponseSettings,
 ) -> tuple[
-    tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array], tuple[_Array, _Array, _Array, _Array], int, float
+    tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array],
+    tuple[_Array, _Array, _Array, _Array],
+    int,
+    float,
+    float,
+    str,
 ]: ...
 
 _Interval = tuple[float, float]

@@ -251,13 +251,15 @@ def _response(
         known_s, dispersion = slopes.align_s, slopes.dispersion
     else:
         known_s, dispersion = float(trusted.delay_s), False
-    note = None
+    note, unaligned = None, "" if math.isfinite(known_s) else str(words.reason(trusted) or "")
     # A record may be long enough for segments, but not for segments that are moved.
     for align_s in (known_s, 0.0) if math.isfinite(known_s) else (0.0,):
         try:
-            return frequency_response(target, measured, rate_hz, align_s=align_s, dispersion=dispersion), None
+            found = frequency_response(target, measured, rate_hz, align_s=align_s, dispersion=dispersion)
         except (SettingError, SignalError) as error:
-            note = f"not determined: {error}"
+            note, unaligned = f"not determined: {error}", str(error)
+            continue
+        return dataclasses.replace(found, unaligned=unaligned), None
     return None, note
 
 
@@ -331,6 +333,7 @@ def _factor_settings(factors: Factors | None) -> dict[str, Any]:
             # moving windows are evaluated with these, too
             "reference_data_decimation": reference.data_decimation,
             "reference_frequency_decimation": reference.frequency_decimation,
+            "windowed": None if factors.windowed is None else factors.windowed.to_dict(),
         }
     }
 

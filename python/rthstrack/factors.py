@@ -43,12 +43,52 @@ class FactorChanges(_Result):
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.name != "measure"}
 
 
+def _changes_sentence(amplitude_bound: float, delay_bound: float, measure: str) -> str:
+    delay = (
+        f"d by at most {100 * delay_bound:.2g} %"
+        if measure == "relative"
+        else f"the phase by at most {delay_bound:.2g} rad (the delay is near zero)"
+    )
+    return f"A by at most {100 * amplitude_bound:.2g} % and {delay}"
+
+
+@dataclass(frozen=True, slots=True)
+class WindowedFactors(_Result):
+    """P and Q that the same tolerance allows under another window, and their bounds, as in `Factors`.
+
+    The bounds count from P = Q = 1 under that window, which weighs the record's parts otherwise: A and d there are
+    another estimate.
+    """
+
+    window: str
+    detrend: str
+    data_decimation: int
+    frequency_decimation: int
+    amplitude_bound: float
+    delay_bound: float
+    delay_measure: Literal["relative", "phase"]
+
+    @property
+    def sentence(self) -> str:
+        """What the window allows, in one sentence."""
+        removed = "trend" if self.detrend == "linear" else "mean"
+        return (
+            f"window {self.window} with the {removed} removed would allow P = {self.data_decimation}, "
+            f"Q = {self.frequency_decimation}: they change "
+            f"{_changes_sentence(self.amplitude_bound, self.delay_bound, self.delay_measure)} under that window"
+        )
+
+    def _columns(self) -> dict[str, Any]:
+        return {f.name: [getattr(self, f.name)] for f in dataclasses.fields(self)}
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Factors(_Result):
     """P and Q that were chosen, and how far A and d are from `reference` there at most.
 
     `amplitude_bound` is relative; `delay_bound` is relative, or a phase in rad where `delay_measure` is "phase".
     `settings` are those of the evaluation, with the chosen factors; `changes` holds all pairs that were considered.
+    `windowed`: where the record's two ends keep Q small, the window that would allow a larger one; nothing is changed.
     """
 
     data_decimation: int
@@ -60,20 +100,16 @@ class Factors(_Result):
     settings: Settings
     reference: Tracking
     changes: FactorChanges = field(repr=False)
+    windowed: WindowedFactors | None = None
 
     @property
     def sentence(self) -> str:
         """The choice and its bound, in one sentence."""
         r = self.reference.settings
-        delay = (
-            f"d by at most {100 * self.delay_bound:.2g} %"
-            if self.delay_measure == "relative"
-            else f"the phase by at most {self.delay_bound:.2g} rad (the delay is near zero)"
-        )
         return (
-            f"P = {self.data_decimation}, Q = {self.frequency_decimation} change A by at most "
-            f"{100 * self.amplitude_bound:.2g} % and {delay} from P = {r.data_decimation}, "
-            f"Q = {r.frequency_decimation} (tolerance {100 * self.tolerance:g} %)"
+            f"P = {self.data_decimation}, Q = {self.frequency_decimation} change "
+            f"{_changes_sentence(self.amplitude_bound, self.delay_bound, self.delay_measure)} from "
+            f"P = {r.data_decimation}, Q = {r.frequency_decimation} (tolerance {100 * self.tolerance:g} %)"
         )
 
     def _columns(self) -> dict[str, Any]:
@@ -96,9 +132,13 @@ def choose_factors(
     is near zero, and |phi - phi_1| <= tolerance in rad takes the place of the second. A pair (P, Q) qualifies when it
     and all pairs of smaller factors keep to that; the one of largest P Q is chosen, among equals that of the larger Q.
 
-    The bins that P and Q keep are among those of P = Q = 1: the bound is the true change, plus 1e-9 for round-off and
-    the cascade, at the cost of one evaluation at P = Q = 1 and up to half as much again. It holds for `evaluate` of
-    this pair with the same settings, not for other records or for parts of this one.
+    The bins that P and Q keep are among those of P = Q = 1: the bound is the true change, plus what round-off and the
+    cascade may do (some 1e-9 where the kept bins hold the energy), at the cost of one evaluation at P = Q = 1 and up to
+    half as much again. It holds for `evaluate` of this pair with the same settings, not for other records or for parts
+    of this one. Where a phase is so near to half a turn that round-off decides the delay's sign, no pair qualifies.
+
+    What Q changes comes from the record's two ends, most of all. Where Q is chosen, could be larger, and no window or
+    no detrending is set, `windowed` says what a window with the mean removed would allow: one or two more choices.
 
     target, measured: (n_samples,), any one unit; rate_hz: samples a second. tolerance: above 0, below 1.
     data_decimation, frequency_decimation: one of them given stays, and changes are counted from it with the other at 1.
@@ -118,11 +158,10 @@ def choose_factors(
     plan = _plan(len(t), rate := _number("rate_hz", rate_hz), base)
     allowed = _number("tolerance", tolerance)
     reference = dataclasses.replace(base, data_decimation=p or 1, frequency_decimation=q or 1)
-    found = _core.choose_factors(plan, t, m, allowed, p, q)
-    chosen_p, chosen_q, amplitude_bound, delay_bound, near_zero, numbers, table = found
-    measure: Literal["relative", "phase"] = "phase" if near_zero else "relative"
-    changes = FactorChanges(*table, measure)
-    return Factors(
+    chosen_p, chosen_q, amplitude_bound, delay_bound, measure, numbers, changes = _choice(
+        _core.choose_factors(plan, t, m, allowed, p, q)
+    )
+    found = Factors(
         chosen_p,
         chosen_q,
         amplitude_bound,
@@ -140,6 +179,52 @@ def choose_factors(
         ),
         changes,
     )
+    if q is None and _may_grow(found):
+        return dataclasses.replace(found, windowed=_windowed(t, m, rate, found, base, p))
+    return found
+
+
+def _choice(found: Any) -> tuple[int, int, float, float, Literal["relative", "phase"], Any, FactorChanges]:
+    p, q, amplitude_bound, delay_bound, near_zero, numbers, table = found
+    measure: Literal["relative", "phase"] = "phase" if near_zero else "relative"
+    columns: Any = (*table, measure)
+    return p, q, amplitude_bound, delay_bound, measure, numbers, FactorChanges(*columns)
+
+
+def _may_grow(found: Factors) -> bool:
+    """Whether bins are left for twice the chosen Q."""
+    c = found.changes
+    twice = (c.data_decimation == found.data_decimation) & (c.frequency_decimation == 2 * found.frequency_decimation)
+    return bool(twice.any())
+
+
+#: In place of none, in turn; each with the mean removed, where no other detrending is set.
+_WINDOWS = ("hann", "tukey")
+
+
+def _windowed(
+    target: NDArray[np.float64],
+    measured: NDArray[np.float64],
+    rate_hz: float,
+    found: Factors,
+    base: Settings,
+    data_decimation: int | None,
+) -> WindowedFactors | None:
+    """The first window that allows a larger Q than the chosen one, at no smaller P Q; None where none does."""
+    detrend = "mean" if base.detrend == "none" else base.detrend
+    windows = _WINDOWS if base.window == "boxcar" else (base.window,)
+    for settings in (dataclasses.replace(base, window=window, detrend=detrend) for window in windows):
+        if settings == base:
+            continue
+        plan = _plan(len(target), rate_hz, settings)
+        try:
+            choice = _core.choose_factors(plan, target, measured, found.tolerance, data_decimation, None)
+        except SignalError:
+            continue  # nothing is left to judge by
+        p, q, amplitude_bound, delay_bound, measure, _, _ = _choice(choice)
+        if q > found.frequency_decimation and p * q >= found.data_decimation * found.frequency_decimation:
+            return WindowedFactors(settings.window, detrend, p, q, amplitude_bound, delay_bound, measure)
+    return None
 
 
 def _tracking(numbers: Any, *about: Any) -> Tracking:

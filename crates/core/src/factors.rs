@@ -9,6 +9,20 @@
 //! percentage worth the name, and it is |phi - phi_1|, in radians. Subscript 1 is P = Q = 1 (or the factor that is given,
 //! with the other at 1). A pair (P, Q) qualifies when both changes are at most the tolerance there and at every pair of
 //! smaller ones. Chosen is the one of largest P Q; among equals that of the larger Q, which saves more.
+//!
+//! # What is allowed for
+//! An evaluation at P and Q folds and filters, so its bins differ from those of the one transform by errors e, whose norm over
+//! all bins is known as a share of the whole spectrum's ([`error_share`]). By Minkowski's and Hoelder's inequalities, with
+//! |x|_l = (sum |x_k|^l)^(1/l) over the bins that are kept, and |e|_l at most |e|_2 for l >= 2, sqrt(bins) |e|_2 for l = 1,
+//!
+//! ```text
+//! sum |I|^l                  changes to within  (|I|_l -+ |e_I|_l)^l
+//! sum O conj(I) |I|^(l-2)    by at most         |e_O|_l u^(l-1) + (l - 1) |O|_l |e_I|_l u^(l-2),   u = |I|_l + |e_I|_l
+//! ```
+//!
+//! and for l = 1, where the latter is a sum of O over unit vectors, by |e_O|_1 + sum |O| min(2, 2 |e_I| / |I|): a bin that holds
+//! nothing but errors has any direction. These are intervals of FEI and f_eq, for both evaluations; the stated change is the
+//! largest between them. Where a phase's interval reaches half a turn the delay may have either sign, and no bound.
 
 use std::f64::consts::PI;
 
@@ -19,14 +33,19 @@ use crate::decimate::Decimator;
 use crate::error::{Error, Result};
 use crate::pair::Pair;
 use crate::spectrum::{Bins, Sink};
-use crate::tracking::{Evaluator, EvaluatorConfig, EvaluatorState, Sums, Term, Tracking};
+use crate::sums;
+use crate::tracking::{Evaluator, EvaluatorConfig, EvaluatorState, Sums, Term, Tracking, weight};
 
 /// Below this phase (0.06 degrees, 0.16 ms at 1 Hz) the tolerance is on the phase, in radians.
 pub const NEAR_ZERO_RAD: f64 = 1e-3;
 
-/// What an evaluation at P and Q may differ from the sums over the bins of P = Q = 1: round-off, and what the cascade lets
-/// alias ([`crate::decimate::ALIAS_DB`]). A share of the record's spectrum, so it counts more where little of it is kept.
-const ALLOWANCE: f64 = 1e-9;
+/// Share of a bin that the cascade lets alias onto a kept one: [`crate::decimate::ALIAS_DB`] at the halving that folds it there,
+/// and the droop of the halvings before, which is made good.
+const ALIAS: f64 = 1.25e-10;
+/// Rounding of a transform, or of the cascade, in units of eps log2 n.
+const ROUNDINGS: f64 = 8.0;
+/// With l = 1, bins below this share of the target's spectrum are taken to have any direction.
+const ANY_DIRECTION: f64 = 1e-9;
 
 /// The user's numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,6 +133,7 @@ pub fn choose_factors(
     check_plan(&settings)?;
     let at = |p: usize, q: usize| EvaluatorConfig { data_decimation: p, frequency_decimation: q, ..settings };
     let reference = (config.data_decimation.unwrap_or(1), config.frequency_decimation.unwrap_or(1));
+    let base = (reference.0.trailing_zeros() as usize, reference.1.trailing_zeros() as usize);
     if reference != (1, 1) {
         // What is wrong with a given factor is said as for any evaluation.
         Evaluator::new(pair.n_samples(), pair.rate_hz(), at(reference.0, reference.1))?;
@@ -121,17 +141,15 @@ pub fn choose_factors(
     evaluator.transform(state, pair)?;
     let levels = Levels::sum(evaluator, state);
     let round_off = evaluator.round_off(pair);
-    let all = levels.at(0, 0).energy;
-    let base = (reference.0.trailing_zeros() as usize, reference.1.trailing_zeros() as usize);
-    let tracking = evaluator.finish(*levels.at(base.0, base.1), pair)?;
+    let tracking = evaluator.finish(levels.at(base.0, base.1).sums, pair)?;
     let measure = if tracking.phase_rad.abs() < NEAR_ZERO_RAD { DelayMeasure::Phase } else { DelayMeasure::Relative };
+    let from = levels.around(base.0, base.1, &tracking);
     let change = |i: usize, j: usize| -> FactorChange {
-        let sums = levels.at(i, j);
-        // Q leaves a Q-th of the bins, and of what aliases onto them.
-        let allowance = ALLOWANCE * (all / (1u64 << j) as f64 / sums.energy).sqrt().max(1.0);
-        let (amplitude, delay) = match sums.tracking(evaluator.delta_f_hz(), round_off) {
+        let sums = &levels.at(i, j).sums;
+        let found = sums.tracking(evaluator.delta_f_hz(), round_off).filter(|found| sums.measured_fits(found));
+        let (amplitude, delay) = match found {
             _ if (i, j) == base => (0.0, 0.0),
-            Some(found) => changes(&tracking, &found, measure, allowance),
+            Some(found) => largest_changes(&from, &levels.around(i, j, &found), measure),
             None => (f64::INFINITY, f64::INFINITY),
         };
         let n_bins = levels.n_bins(i, j);
@@ -172,19 +190,47 @@ pub fn choose_factors(
     })
 }
 
-/// Changes from `reference` to `found`, each with `allowance`, an error of the complex FEI and of f_eq.
-fn changes(reference: &Tracking, found: &Tracking, measure: DelayMeasure, allowance: f64) -> (f64, f64) {
-    let relative = |a: f64, b: f64| (a / b - 1.0).abs();
-    let amplitude = relative(found.amplitude, reference.amplitude) + allowance;
-    let delay = match measure {
-        DelayMeasure::Relative => {
-            relative(found.delay_s, reference.delay_s) + allowance * (1.0 + 1.0 / reference.phase_rad.abs())
-        }
-        DelayMeasure::Phase => (found.phase_rad - reference.phase_rad).abs() + allowance,
+/// Between which values an evaluation gives its numbers.
+struct Around {
+    amplitude: [f64; 2],
+    /// Outside of (-pi, pi) where a phase may jump by a turn.
+    phase: [f64; 2],
+    /// f_eq
+    frequency: [f64; 2],
+}
+
+/// The largest changes of A and d between two evaluations; infinite where there is no largest.
+fn largest_changes(from: &Around, to: &Around, measure: DelayMeasure) -> (f64, f64) {
+    let farthest = |[low, high]: [f64; 2]| {
+        // Where measured is zero throughout there is nothing to compare.
+        if low.is_nan() || high.is_nan() { f64::INFINITY } else { (high - 1.0).max(1.0 - low) }
     };
-    // Where measured is zero throughout there is nothing to compare.
-    let known = |change: f64| if change.is_nan() { f64::INFINITY } else { change };
-    (known(amplitude), known(delay))
+    let amplitude = farthest(ratios(to.amplitude, from.amplitude));
+    let one_turn = |[low, high]: [f64; 2]| -PI < low && high < PI;
+    if !(one_turn(from.phase) && one_turn(to.phase)) {
+        return (amplitude, f64::INFINITY);
+    }
+    let delay = match measure {
+        DelayMeasure::Phase => (to.phase[1] - from.phase[0]).max(from.phase[1] - to.phase[0]),
+        DelayMeasure::Relative => {
+            let lag = from.phase[0] + from.phase[1] < 0.0;
+            let [to_phase, from_phase] =
+                [to.phase, from.phase].map(|[low, high]| if lag { [-high, -low] } else { [low, high] });
+            let [low, high] = ratios(to_phase, from_phase);
+            let slower = ratios(from.frequency, to.frequency);
+            let times = |ratio: f64, ends: [f64; 2]| ratio * ends[usize::from(ratio > 0.0)];
+            farthest([times(low, [slower[1], slower[0]]), times(high, slower)])
+        }
+    };
+    (amplitude, delay)
+}
+
+/// Least and largest of x / y, x and y within their intervals; without end where y may be zero.
+fn ratios(x: [f64; 2], y: [f64; 2]) -> [f64; 2] {
+    if y[0] <= 0.0 {
+        return [f64::NEG_INFINITY, f64::INFINITY];
+    }
+    [x[0] / y[usize::from(x[0] > 0.0)], x[1] / y[usize::from(x[1] <= 0.0)]]
 }
 
 fn check_plan(settings: &EvaluatorConfig) -> Result<()> {
@@ -203,14 +249,36 @@ fn check_plan(settings: &EvaluatorConfig) -> Result<()> {
     Ok(())
 }
 
-/// The sums of Eqs 7 and 12 of every P = 2^i and Q = 2^j.
+/// What the bins of one P and Q add up to.
+#[derive(Debug, Clone, Copy, Default)]
+struct Level {
+    /// Eqs 7 and 12.
+    sums: Sums,
+    /// sum |O|^l, O over its spectrum's norm; for l = 1 sum (|O| / |I|)^2 over the bins that have a direction.
+    measured: f64,
+    /// For l = 1, sum |O| over the other bins.
+    astray: f64,
+}
+
+impl Level {
+    fn add(&mut self, other: &Level) {
+        self.sums.add(&other.sums);
+        self.measured += other.measured;
+        self.astray += other.astray;
+    }
+}
+
+/// The sums of every P = 2^i and Q = 2^j.
 struct Levels {
     /// log2 p + 1, the number of powers of two up to p.
     count: usize,
     /// First and last bin kept at P = Q = 1.
     first: usize,
     last: usize,
-    sums: Vec<Sums>,
+    weight_power: u32,
+    /// Norms of the spectra of target and measured, zero frequency and what the band drops included.
+    norms: [f64; 2],
+    levels: Vec<Level>,
 }
 
 impl Levels {
@@ -219,17 +287,20 @@ impl Levels {
         let count = spectrum.fft_len().trailing_zeros() as usize;
         let (first, last) = (spectrum.first(), spectrum.first() + spectrum.n_bins() - 1);
         let weight_power = evaluator.config().weight_power;
-        let sums = vec![Sums::default(); count * count];
-        let sums = if weight_power == 2 {
-            let mut sort = Sort::<2> { weight_power, count, sums };
+        // The packed transform has half of the energy of all n bins, as have the bins up to n / 2.
+        let norms = state.spectrum.pair().map(|bins| sums::energy(bytemuck::cast_slice(bins)).sqrt());
+        let per_norm = norms.map(|norm| 1.0 / norm);
+        let levels = vec![Level::default(); count * count];
+        let levels = if weight_power == 2 {
+            let mut sort = Sort::<2> { weight_power, count, per_norm, levels };
             spectrum.visit(&state.spectrum, &mut sort);
-            sort.sums
+            sort.levels
         } else {
-            let mut sort = Sort::<0> { weight_power, count, sums };
+            let mut sort = Sort::<0> { weight_power, count, per_norm, levels };
             spectrum.visit(&state.spectrum, &mut sort);
-            sort.sums
+            sort.levels
         };
-        let mut levels = Self { count, first, last, sums };
+        let mut levels = Self { count, first, last, weight_power, norms, levels };
         levels.accumulate();
         levels
     }
@@ -239,50 +310,111 @@ impl Levels {
         let count = self.count;
         for i in 0..count {
             for j in (0..count - 1).rev() {
-                let next = self.sums[i * count + j + 1];
-                self.sums[i * count + j].add(&next);
+                let next = self.levels[i * count + j + 1];
+                self.levels[i * count + j].add(&next);
             }
         }
         for i in (0..count - 1).rev() {
             for j in 0..count {
-                let next = self.sums[(i + 1) * count + j];
-                self.sums[i * count + j].add(&next);
+                let next = self.levels[(i + 1) * count + j];
+                self.levels[i * count + j].add(&next);
             }
         }
     }
 
-    fn at(&self, i: usize, j: usize) -> &Sums {
-        &self.sums[i * self.count + j]
+    fn at(&self, i: usize, j: usize) -> &Level {
+        &self.levels[i * self.count + j]
+    }
+
+    /// The highest bin that (i, j) may keep.
+    fn up_to(&self, i: usize) -> usize {
+        self.last.min((1 << (self.count - 1)) >> i)
     }
 
     /// Multiples of 2^j in first ..= min(last, p / 2^i).
     fn n_bins(&self, i: usize, j: usize) -> usize {
-        let up_to = self.last.min((1 << (self.count - 1)) >> i);
-        (up_to >> j).saturating_sub((self.first - 1) >> j)
+        (self.up_to(i) >> j).saturating_sub((self.first - 1) >> j)
     }
+
+    /// `found` at (i, j), with what is allowed for.
+    fn around(&self, i: usize, j: usize, found: &Tracking) -> Around {
+        let Level { sums, measured, astray } = *self.at(i, j);
+        let [target_norm, measured_norm] = self.norms;
+        let (l, n_bins) = (f64::from(self.weight_power), self.n_bins(i, j) as f64);
+        let share = error_share(self.count, i, j);
+        let spread = if self.weight_power == 1 { n_bins.sqrt() } else { 1.0 };
+        // All in units of |I|_l.
+        let size = sums.power.powf(1.0 / l);
+        let (target_error, measured_error) =
+            (spread * share * target_norm / size, spread * share * measured_norm / size);
+        let adding = n_bins * f64::EPSILON;
+        let (measured_size, turned) = if self.weight_power == 1 {
+            let over_target = measured_norm / target_norm * measured.sqrt();
+            (spread * measured_norm / size, 2.0 * (share * target_norm * over_target + astray * measured_norm) / size)
+        } else {
+            let measured_size = measured_norm * measured.powf(1.0 / l) / size;
+            (measured_size, (l - 1.0) * measured_size * target_error * (1.0 + target_error).powf(l - 2.0))
+        };
+        let cross = measured_error * (1.0 + target_error).powf(l - 1.0) + turned + adding * measured_size;
+        // Of a sum of positive terms: the errors in units of its own l-th root.
+        let within = |error: f64| [(1.0 - error).max(0.0).powf(l) - adding, (1.0 + error).powf(l) + adding];
+        let power = within(target_error);
+        let highest = self.up_to(i) as f64;
+        let moment = within(target_error * (highest * sums.power / sums.moment).powf(1.0 / l));
+        let Tracking { amplitude, phase_rad, equivalent_frequency_hz, .. } = *found;
+        let turn = if cross < amplitude { (cross / amplitude).asin() } else { PI } + f64::EPSILON * PI;
+        let [low, high] = ratios(moment, power);
+        Around {
+            amplitude: ratios([amplitude - cross, amplitude + cross], power),
+            phase: [phase_rad - turn, phase_rad + turn],
+            frequency: [low * equivalent_frequency_hz, high * equivalent_frequency_hz],
+        }
+    }
+}
+
+/// Norm of the errors of the bins at P = 2^i and Q = 2^j, as a share of the whole spectrum's norm, for n = 2^count: rounding
+/// of the transform and the cascade, of Q - 1 additions of blocks, and what aliases, up to P / 2 bins onto each.
+fn error_share(count: usize, i: usize, j: usize) -> f64 {
+    let cascade = if i > 1 { ALIAS * ((1u64 << (i - 1)) as f64).sqrt() } else { 0.0 };
+    f64::EPSILON * (ROUNDINGS * (1 + count) as f64 + (1u64 << j) as f64) + cascade
 }
 
 /// Adds each bin to the sums of the largest P and the largest Q that keep it.
 struct Sort<const L: u32> {
     weight_power: u32,
     count: usize,
-    sums: Vec<Sums>,
+    /// One over the norms of the spectra.
+    per_norm: [f64; 2],
+    levels: Vec<Level>,
 }
 
 impl<const L: u32> Sink for Sort<L> {
     #[inline(always)]
     fn take<const W: usize>(&mut self, bins: &Bins<W>) {
+        let [per_target, per_measured] = self.per_norm;
         for n in 0..W {
             let k = bins.first + n;
-            let term = Term::new::<L>(
-                self.weight_power,
-                (bins.target_re[n], bins.target_im[n]),
-                (bins.measured_re[n], bins.measured_im[n]),
-            );
+            let (or, oi) = (bins.measured_re[n], bins.measured_im[n]);
+            let term = Term::new::<L>(self.weight_power, (bins.target_re[n], bins.target_im[n]), (or, oi));
             // k <= p / 2^i up to i = log2 p - ceil(log2 k); 2^j divides k up to its trailing zeros.
             let i = self.count - 1 - (usize::BITS - (k - 1).leading_zeros()) as usize;
             let j = k.trailing_zeros() as usize;
-            self.sums[i * self.count + j].add_term(&term, k);
+            let level = &mut self.levels[i * self.count + j];
+            level.sums.add_term(&term, k);
+            let (or, oi) = (or * per_measured, oi * per_measured);
+            let squared = or * or + oi * oi;
+            if L == 2 {
+                level.measured += squared;
+            } else if self.weight_power > 1 {
+                level.measured += weight(squared, self.weight_power);
+            } else {
+                let direction = term.squared * (per_target * per_target);
+                if direction < ANY_DIRECTION * ANY_DIRECTION {
+                    level.astray += squared.sqrt();
+                } else {
+                    level.measured += squared / direction;
+                }
+            }
         }
     }
 }

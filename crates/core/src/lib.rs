@@ -61,7 +61,7 @@ pub use monitor::{Monitor, MonitorConfig, MonitorState, Processed, Reading};
 pub use moving::{MovingConfig, MovingTracking, evaluate_moving};
 pub use pair::Pair;
 pub use reason::Reason;
-pub use response::{FrequencyResponse, ResponseConfig, frequency_response};
+pub use response::{FrequencyResponse, ResponseConfig, Unaligned, frequency_response};
 pub use slopes::{FrequencySlopes, Slope, SlopesConfig, frequency_slopes};
 pub use tracking::{Estimator, Evaluator, EvaluatorConfig, EvaluatorState, Noise, Spectra, Tracking};
 pub use window::{Detrend, Window};

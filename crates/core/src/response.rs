@@ -23,6 +23,7 @@
 
 use std::collections::VecDeque;
 use std::f64::consts::PI;
+use std::fmt;
 use std::ops::Range;
 
 use num_complex::Complex;
@@ -30,8 +31,9 @@ use num_complex::Complex;
 use crate::error::{Error, Result};
 use crate::pair::Pair;
 use crate::quantile::student_t_975;
+use crate::reason::Reason;
 use crate::spectrum::{Bins, Sink, Spectrum, SpectrumConfig, SpectrumState};
-use crate::tracking::delay;
+use crate::tracking::{Estimator, Evaluator, EvaluatorConfig, delay};
 use crate::window::{Detrend, Window};
 
 /// Shortest segment that is worth a spectrum.
@@ -66,8 +68,9 @@ pub struct ResponseConfig {
     pub window: Window,
     /// What is subtracted from each segment.
     pub detrend: Detrend,
-    /// The delay, as far as it is known, in seconds: target's segments are taken that much earlier than measured's.
-    pub align_s: f64,
+    /// The delay, as far as it is known, in seconds: target's segments are taken that much earlier than measured's. `None`: the
+    /// delay by least squares, mean removed.
+    pub align_s: Option<f64>,
     /// Whether to correct what windows make of a gain and a delay that change from bin to bin, or differ from `align_s`.
     pub dispersion: bool,
 }
@@ -79,7 +82,7 @@ impl Default for ResponseConfig {
             overlap: 0.5,
             window: Window::Hann,
             detrend: Detrend::Mean,
-            align_s: 0.0,
+            align_s: None,
             dispersion: false,
         }
     }
@@ -118,20 +121,51 @@ pub struct FrequencyResponse {
     pub n_segments: usize,
     /// Length of a segment, in seconds.
     pub segment_s: f64,
+    /// The delay at which segments are aligned, in seconds.
+    pub align_s: f64,
+    /// Why they are not, where nothing was said of it.
+    pub unaligned: Option<Unaligned>,
+}
+
+/// Why segments are not aligned at a delay that was to be found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum Unaligned {
+    /// The delay could not be determined.
+    Unknown(Reason),
+    /// It leaves fewer than two segments of the record.
+    NoRoom {
+        /// The delay, in seconds.
+        delay_s: f64,
+    },
+}
+
+impl fmt::Display for Unaligned {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Unaligned::Unknown(reason) => reason.fmt(f),
+            Unaligned::NoRoom { delay_s } => write!(
+                f,
+                "the record is too short for two segments {:.4} ms apart; take shorter ones",
+                1e3 * delay_s.abs()
+            ),
+        }
+    }
 }
 
 /// Averages cross-spectra over overlapping windowed segments (Welch 1967), zero-padded to a power of two.
 ///
-/// S_IO = mean conj(I) O, so that its phase is negative on lag. A delay tau moves motion out of the window that it stood in,
-/// which costs a share of up to tau over the segment's length of gain and delay; `align_s` gives it back (Bendat and Piersol
-/// 2010, section 9.1): whole samples by taking target's segments earlier, the rest by moving the window over the target.
-/// `dispersion` does so at every bin, to first order.
+/// S_IO = mean conj(I) O, so that its phase is negative on lag. A delay tau moves motion out of the window that it stood in, and
+/// other motion into it. At the strongest bins that costs about tau over the segment's length of gain; where the target is weak
+/// beside neighbouring frequencies, or stands in few segments, as many times more as these are stronger. `align_s` gives it back
+/// (Bendat and Piersol 2010, section 9.1): whole samples by taking target's segments earlier, the rest by moving the window over
+/// the target. `dispersion` does so at every bin, to first order.
 ///
 /// # Errors
 /// [`Error::TooShort`], [`Error::Setting`] for a segment, overlap or alignment that leaves fewer than two segments,
 /// [`Error::NotFinite`], [`Error::Range`].
 pub fn frequency_response(pair: &Pair<'_>, config: &ResponseConfig) -> Result<FrequencyResponse> {
-    let welch = Welch::new(pair, config)?;
+    let (welch, align_s, unaligned) = aligned(pair, config)?;
     let averages = welch.averages(pair);
     let n_bins = averages.target.len();
     let frequency_hz = welch.frequency_hz();
@@ -168,7 +202,30 @@ pub fn frequency_response(pair: &Pair<'_>, config: &ResponseConfig) -> Result<Fr
         delay_interval_s,
         n_segments: welch.n_segments,
         segment_s: welch.segment_s,
+        align_s,
+        unaligned,
     })
+}
+
+/// The plan at the alignment that was given, or found.
+fn aligned(pair: &Pair<'_>, config: &ResponseConfig) -> Result<(Welch, f64, Option<Unaligned>)> {
+    if let Some(align_s) = config.align_s {
+        return Ok((Welch::new(pair, config)?, align_s, None));
+    }
+    // Whatever else is wrong is said first.
+    let plain = Welch::new(pair, config)?;
+    let settings = EvaluatorConfig { estimator: Estimator::LeastSquares, detrend: Detrend::Mean, ..Default::default() };
+    let evaluator = Evaluator::new(pair.n_samples(), pair.rate_hz(), settings)?;
+    let found = evaluator.evaluate(&mut evaluator.state(), pair)?;
+    if let Some(reason) = found.reason.filter(Reason::is_undetermined) {
+        return Ok((plain, 0.0, Some(Unaligned::Unknown(reason))));
+    }
+    let delay_s = found.delay_s;
+    match Welch::new(pair, &ResponseConfig { align_s: Some(delay_s), ..*config }) {
+        Ok(welch) => Ok((welch, delay_s, None)),
+        Err(Error::Setting { .. }) => Ok((plain, 0.0, Some(Unaligned::NoRoom { delay_s }))),
+        Err(error) => Err(error),
+    }
 }
 
 /// The checked plan: which samples are segments, and what is done to each.
@@ -196,6 +253,7 @@ impl Welch {
         pair.check_samples()?;
         let (n, rate_hz) = (pair.n_samples(), pair.rate_hz());
         let ResponseConfig { segment_s, overlap, window, detrend, align_s, dispersion } = *config;
+        let align_s = align_s.unwrap_or(0.0);
         if n < MIN_SEGMENT * MIN_SEGMENTS {
             return Err(Error::TooShort { expected: MIN_SEGMENT * MIN_SEGMENTS, found: n });
         }

@@ -34,7 +34,7 @@ const BENT: f64 = 3.0;
 /// The user's numbers for [`frequency_slopes`].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SlopesConfig {
-    /// Segments and windows; its `align_s` and `dispersion` are where the search starts.
+    /// Segments and windows; its `align_s`, 0 unless given, and `dispersion` are where the search starts.
     pub response: ResponseConfig,
     /// Lowest and highest frequency used, both included, in hertz.
     pub band_hz: Option<(f64, f64)>,
@@ -112,13 +112,14 @@ pub fn frequency_slopes(pair: &Pair<'_>, config: &SlopesConfig) -> Result<Freque
     for _ in 0..MAX_ALIGNMENTS {
         let FrequencySlopes { equivalent_frequency_hz, gain, delay, .. } = found;
         let envelope = if delay.varies { equivalent_frequency_hz * delay.slope } else { 0.0 };
-        let align_s = if config.keep_alignment { response.align_s } else { delay.value + envelope };
+        let before = response.align_s.unwrap_or(0.0);
+        let align_s = if config.keep_alignment { before } else { delay.value + envelope };
         let dispersion = gain.varies || delay.varies;
-        let still = (align_s - response.align_s).abs() * pair.rate_hz() < STILL_SAMPLES;
+        let still = (align_s - before).abs() * pair.rate_hz() < STILL_SAMPLES;
         if still && dispersion == response.dispersion {
             break;
         }
-        response = ResponseConfig { align_s, dispersion, ..response };
+        response = ResponseConfig { align_s: Some(align_s), dispersion, ..response };
         found = match fit(pair, &response, config.band_hz) {
             // The record has no room for that.
             Err(Error::Setting { .. }) => break,
@@ -204,7 +205,7 @@ fn fit(pair: &Pair<'_>, config: &ResponseConfig, band_hz: Option<(f64, f64)>) ->
         delay: finish(&delay_line, [std[2], std[3]], practical_delay_s),
         band_hz: band,
         n_bins: used.len(),
-        align_s: config.align_s,
+        align_s: config.align_s.unwrap_or(0.0),
         dispersion: config.dispersion,
         n_segments: welch.n_segments,
         segment_s: welch.segment_s,

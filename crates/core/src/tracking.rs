@@ -533,7 +533,7 @@ impl Evaluator {
                 Error::Range { signal: Signal::Target, peak, weight_power: self.config.weight_power }
             });
         };
-        if !(SUMS.contains(&cross_size) && SUMS.contains(&tracking.amplitude)) {
+        if !sums.measured_fits(&tracking) {
             let peak = peak(pair.measured());
             if peak > 0.0 {
                 return Err(Error::Range { signal: Signal::Measured, peak, weight_power: self.config.weight_power });
@@ -578,7 +578,7 @@ pub fn delay(phase_rad: f64, frequency_hz: f64) -> f64 {
 
 /// |I|^l from |I|^2.
 #[inline(always)]
-fn weight(squared: f64, power: u32) -> f64 {
+pub(crate) fn weight(squared: f64, power: u32) -> f64 {
     let even = squared.powi((power / 2) as i32);
     if power.is_multiple_of(2) { even } else { even * squared.sqrt() }
 }
@@ -614,6 +614,11 @@ impl Sums {
 
     fn cross_size(&self) -> f64 {
         self.cross.re.abs().max(self.cross.im.abs())
+    }
+
+    /// Whether what measured adds lies well within double precision.
+    pub(crate) fn measured_fits(&self, found: &Tracking) -> bool {
+        SUMS.contains(&self.cross_size()) && SUMS.contains(&found.amplitude)
     }
 
     /// Eqs 10 and 11; `None` where the sums leave double precision or hold no more than `round_off`.

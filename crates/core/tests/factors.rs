@@ -109,6 +109,20 @@ fn every_change_is_that_of_an_evaluation_and_the_choice_is_the_largest_that_qual
 }
 
 #[test]
+fn a_phase_at_half_a_turn_has_no_bound_and_nothing_larger_is_chosen() {
+    let (target, _) = pair(3000, 0.0);
+    let measured: Vec<f64> = target.iter().map(|x| -1.3 * x).collect();
+    let pair = Pair::new(&target, &measured, RATE_HZ).unwrap();
+    for weight_power in [1, 2, 5] {
+        let plan = EvaluatorConfig { weight_power, ..Default::default() };
+        let found = choose(&pair, plan, FactorsConfig { tolerance: 0.9, ..Default::default() }).unwrap();
+        assert_eq!((found.data_decimation, found.frequency_decimation, found.delay_bound), (1, 1, 0.0));
+        assert!(found.table[1..].iter().all(|entry| entry.delay.is_infinite()));
+        assert!(found.table[1].amplitude < ALLOWANCE, "the amplitude is known: {:?}", found.table[1]);
+    }
+}
+
+#[test]
 fn a_given_factor_stays_and_the_other_is_counted_from_it() {
     let (target, measured) = pair(5000, 0.012);
     let pair = Pair::new(&target, &measured, RATE_HZ).unwrap();

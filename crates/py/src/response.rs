@@ -18,7 +18,7 @@ type Curves<'py> = (Array<'py>, Array<'py>, Array<'py>, Array<'py>, Array<'py>, 
 type Uncertainty<'py> = (Array<'py>, Interval<'py>, Array<'py>, Interval<'py>);
 
 /// segment_s, overlap, window, detrend, align_s, dispersion
-type Settings<'a> = (Option<f64>, f64, &'a str, &'a str, f64, bool);
+type Settings<'a> = (Option<f64>, f64, &'a str, &'a str, Option<f64>, bool);
 
 fn config(py: Python<'_>, settings: Settings<'_>) -> PyResult<ResponseConfig> {
     let (segment_s, overlap, window, detrend, align_s, dispersion) = settings;
@@ -32,7 +32,7 @@ fn config(py: Python<'_>, settings: Settings<'_>) -> PyResult<ResponseConfig> {
     })
 }
 
-/// The curves, their uncertainty, n_segments and segment_s.
+/// The curves, their uncertainty, n_segments, segment_s, align_s and why it is 0 where it was to be found.
 #[pyfunction]
 pub(crate) fn frequency_response<'py>(
     py: Python<'py>,
@@ -40,7 +40,7 @@ pub(crate) fn frequency_response<'py>(
     measured: PyReadonlyArray1<'py, f64>,
     rate_hz: f64,
     settings: Settings<'_>,
-) -> PyResult<(Curves<'py>, Uncertainty<'py>, usize, f64)> {
+) -> PyResult<(Curves<'py>, Uncertainty<'py>, usize, f64, f64, String)> {
     let config = config(py, settings)?;
     let (target, measured) = (target.as_slice()?, measured.as_slice()?);
     let response = py
@@ -61,7 +61,8 @@ pub(crate) fn frequency_response<'py>(
         response.delay_std_s.into_pyarray(py),
         interval(py, response.delay_interval_s)?,
     );
-    Ok((curves, uncertainty, response.n_segments, response.segment_s))
+    let why = response.unaligned.map_or_else(String::new, |why| why.to_string());
+    Ok((curves, uncertainty, response.n_segments, response.segment_s, response.align_s, why))
 }
 
 fn interval(py: Python<'_>, rows: Vec<[f64; 2]>) -> PyResult<Interval<'_>> {

@@ -402,6 +402,7 @@ def _print_one(console: Console, a: Assessment) -> None:
         ("bins", f"{t.n_bins}, every {t.delta_f_hz:.4g} Hz{band}"),
         *_reason_rows(a),
         *([("P and Q chosen", a.factors.sentence)] if a.factors else []),
+        *([("a larger Q", a.factors.windowed.sentence)] if a.factors and a.factors.windowed else []),
         *_moving_rows(a),
         ("max tracking error", f"{i.max_tracking_error:.4g}{unit} ({i.max_tracking_error_percent:.3g} %)"),
         ("rms error", f"{i.rms_error:.4g}{unit} ({i.rms_error_percent:.3g} %)"),
