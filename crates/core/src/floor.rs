@@ -19,8 +19,11 @@ const SQUARES: f64 = 12870.0;
 const INDEPENDENT: f64 = 0.13;
 /// Samples of a part.
 const PART: usize = 128;
-/// Samples that are compared with measured at most.
-const COMPARED: usize = 1 << 14;
+/// Samples that are compared with measured, at how many lags, and how many of them at once.
+const LEAST_COMPARED: usize = 1 << 11;
+const MOST_COMPARED: usize = 1 << 14;
+const LAGS: usize = 4;
+const STRIP: usize = 128;
 /// Two channels' differences are alike from this correlation on, and this many standard deviations of chance.
 const ALIKE: f64 = 0.15;
 const CLEAR: f64 = 5.0;
@@ -45,9 +48,7 @@ pub(crate) fn variance(samples: &[f64], stride: usize) -> f64 {
                 let x: [&[f64; LANES]; ORDER + 1] =
                     std::array::from_fn(|j| terms[j][at..at + LANES].try_into().expect("LANES of them"));
                 for i in 0..LANES {
-                    let d = x[0][i] + x[8][i] - 8.0 * (x[1][i] + x[7][i]) + 28.0 * (x[2][i] + x[6][i])
-                        - 56.0 * (x[3][i] + x[5][i])
-                        + 70.0 * x[4][i];
+                    let d = difference(|j| x[j][i]);
                     lanes[i] += d * d;
                 }
                 at += LANES;
@@ -74,8 +75,10 @@ pub(crate) fn sampled_variance(samples: &[f64], stride: usize) -> (f64, f64) {
     if n == 0.0 { (variance(samples, stride), INDEPENDENT * samples.len() as f64) } else { (sum / n, INDEPENDENT * n) }
 }
 
+/// d from the nine samples it is made of.
+#[inline(always)]
 fn difference(x: impl Fn(usize) -> f64) -> f64 {
-    BINOMIAL.iter().enumerate().map(|(j, c)| c * x(j)).sum()
+    x(0) + x(8) - 8.0 * (x(1) + x(7)) + 28.0 * (x(2) + x(6)) - 56.0 * (x(3) + x(5)) + 70.0 * x(4)
 }
 
 /// What the variance is of noise that correlates so between samples, over that of white noise.
@@ -88,27 +91,78 @@ pub(crate) fn of_correlated(correlation: &[f64]) -> f64 {
 /// The share of the target's differences that measured follows at about `lag` samples and a gain: motion, not noise.
 /// `target` and `measured` are the same stretch.
 pub(crate) fn followed(target: &[f64], measured: &[f64], lag: f64, gain: f64) -> f64 {
-    let n = target.len().min(COMPARED);
-    let from = (target.len() - n) / 2;
-    let base = lag.floor() as isize;
-    let margin = base.unsigned_abs() + 2;
-    if n < 2 * margin + 8 * ORDER {
+    let n = target.len().min((target.len() / 2).clamp(LEAST_COMPARED, MOST_COMPARED));
+    let base = lag.floor() as isize - 1;
+    let margin = base.unsigned_abs() + LAGS;
+    if n < 2 * margin + STRIP + ORDER {
         return 0.0;
     }
-    let d = |x: &[f64], i: usize| difference(|j| x[i + j]);
-    let (mut own, mut other, mut products) = (0.0, 0.0, [0.0; 4]);
-    for i in from + margin..from + n - margin - ORDER {
-        let x = d(target, i);
-        own += x * x;
-        for (k, product) in products.iter_mut().enumerate() {
-            let y = d(measured, i.saturating_add_signed(base + k as isize - 1));
-            *product += x * y;
-            other += 0.25 * y * y;
+    let from = (target.len() - n) / 2 + margin;
+    let to = from + n - 2 * margin - ORDER;
+    let Followed { own, other, products } = Arch::new().dispatch(Follow { target, measured, base, from, to });
+    let most = products.iter().fold(0.0, |m: f64, p| m.max(p.abs()));
+    let chance = CLEAR / (INDEPENDENT * (to - from) as f64).sqrt();
+    if most > (own * other).sqrt() * ALIKE.max(chance) { (BETWEEN * most / (gain * own)).min(1.0) } else { 0.0 }
+}
+
+/// Energies of the differences of both, and sums of products at each lag.
+#[derive(Default)]
+struct Followed {
+    own: f64,
+    other: f64,
+    products: [f64; LAGS],
+}
+
+/// The differences from `from` to `to` of the target with those of measured `base` and more later, a strip at a time.
+struct Follow<'a> {
+    target: &'a [f64],
+    measured: &'a [f64],
+    base: isize,
+    from: usize,
+    to: usize,
+}
+
+impl NullaryFnOnce for Follow<'_> {
+    type Output = Followed;
+
+    #[inline(always)]
+    fn call(self) -> Followed {
+        let Self { target, measured, base, from, to } = self;
+        let mut found = Followed::default();
+        for at in (from..to.saturating_sub(STRIP - 1)).step_by(STRIP) {
+            let x: &[f64; STRIP + ORDER] = target[at..at + STRIP + ORDER].try_into().expect("so many");
+            let later = at.saturating_add_signed(base);
+            let y: &[f64; STRIP + LAGS + ORDER] =
+                measured[later..later + STRIP + LAGS + ORDER].try_into().expect("so many");
+            let (mut dx, mut dy) = ([0.0; STRIP], [0.0; STRIP + LAGS]);
+            for (i, d) in dx.iter_mut().enumerate() {
+                *d = difference(|j| x[i + j]);
+            }
+            for (i, d) in dy.iter_mut().enumerate() {
+                *d = difference(|j| y[i + j]);
+            }
+            found.own += dot(&dx, &dx);
+            let part: &[f64; STRIP] = dy[..STRIP].try_into().expect("so many");
+            found.other += dot(part, part);
+            for (k, product) in found.products.iter_mut().enumerate() {
+                *product += dot(&dx, dy[k..k + STRIP].try_into().expect("so many"));
+            }
+        }
+        found
+    }
+}
+
+/// sum a b, in lanes.
+#[inline(always)]
+fn dot(a: &[f64; STRIP], b: &[f64; STRIP]) -> f64 {
+    const LANES: usize = 16;
+    let mut lanes = [0.0; LANES];
+    for part in 0..STRIP / LANES {
+        for i in 0..LANES {
+            lanes[i] += a[part * LANES + i] * b[part * LANES + i];
         }
     }
-    let most = products.iter().fold(0.0, |m: f64, p| m.max(p.abs()));
-    let chance = CLEAR / (INDEPENDENT * n as f64).sqrt();
-    if most > (own * other).sqrt() * ALIKE.max(chance) { (BETWEEN * most / (gain * own)).min(1.0) } else { 0.0 }
+    lanes.iter().sum()
 }
 
 #[cfg(test)]

@@ -41,6 +41,8 @@ use crate::window::{Detrend, Window};
 const MAX_STEPS: usize = 24;
 /// A step this short, in samples, is the last: what it leaves is its square.
 const LAST_STEP: f64 = 1e-4;
+/// A step this short is the last, though its slope is known by its size alone.
+const SETTLED: f64 = 1e-7;
 /// The same where the slope has been measured, noise and all.
 const LAST_SECANT_STEP: f64 = 2e-3;
 /// Fewest samples that are judged.
@@ -350,7 +352,7 @@ impl Alignment {
         expected: Option<f64>,
     ) -> std::result::Result<Tracking, Reason> {
         state.target_noise = 0.0;
-        if self.estimator != Estimator::LeastSquares || self.noise_ratio > 0.0 || self.noise == Noise::Coloured {
+        if self.noise_ratio > 0.0 || self.noise == Noise::Coloured {
             return self.judge(state, view, start, expected);
         }
         let own = start - view.origin..start + self.n_samples - view.origin;
@@ -759,7 +761,7 @@ impl Alignment {
     ) -> std::result::Result<Fit, Reason> {
         let (low, high) = (tau - room, tau + room);
         let within = support.start - start..support.end - start;
-        let known = state.target_noise * self.window_moments(&within).0;
+        let known = if state.target_noise > 0.0 { state.target_noise * self.window_moments(&within).0 } else { 0.0 };
         // Where the score is known to be positive (the delay is larger) and negative.
         let (mut below, mut above) = (low, high);
         let mut now = tau;
@@ -943,7 +945,10 @@ impl Alignment {
         let mut slope = f64::NAN;
         let mut last: Option<(f64, f64)> = None;
         // Re sum Y' conj Y / sum |Y|^2, by Parseval: how the amplitude changes with the delay.
-        let growth = fit.products.yv / fit.products.yy;
+        let growth = fit.clean.yv / fit.clean.yy;
+        // Noise on the target adds to sum |Y|^2 alone.
+        let all = 2 * self.kept.spectrum.n_bins() == self.kept.spectrum.folded_len() && self.weight_power == 2;
+        let clean = if all { fit.clean.yy / fit.products.yy } else { 1.0 };
         self.kept.spectrum.transform_one(&mut state.scratch, &state.signals.measured, None, &mut state.bins[MEASURED]);
         for _ in 0..MAX_STEPS {
             let tau = fit.tau;
@@ -977,7 +982,8 @@ impl Alignment {
                 }
                 None => {
                     slope = 2.0 * std::f64::consts::PI * per_sample;
-                    if self.weight_power == 2 {
+                    let settled = phase.abs() < SETTLED * slope;
+                    if self.weight_power == 2 && !settled {
                         // y moves by -y' a sample: d arg(sum O conj Y) = -Im(sum O conj Y' / sum O conj Y). Where the window
                         // cuts much off the motion it is far from 2 pi f_eq.
                         self.kept.spectrum.transform_one(scratch, &signals.slope, None, v);
@@ -995,7 +1001,7 @@ impl Alignment {
                 return Err(Reason::NoConvergence);
             }
             if step.abs() < last_step {
-                fit = Fit { tau: tau + step, step, gain: fei.norm() * (1.0 + growth * step), ..fit };
+                fit = Fit { tau: tau + step, step, gain: fei.norm() / clean * (1.0 + growth * step), ..fit };
                 let averaged = Averaged { equivalent_frequency_hz, power: found.power, slope, growth };
                 let mut tracking = self.finish(state, start, &support, &fit, Some(averaged));
                 if self.weight_power != 2 && tracking.reason.is_none() {
@@ -1040,9 +1046,10 @@ impl Alignment {
             reason: None,
             ..Tracking::undetermined(Reason::Still)
         };
-        match self.precision(state, start, support, fit, averaged) {
+        let exact = 1.0 - left <= EXACT;
+        match self.precision(state, start, support, fit, averaged, exact) {
             None => tracking.without_interval(Reason::FewBins),
-            Some(precision) => self.with_precision(tracking, &precision, 1.0 - left <= EXACT),
+            Some(precision) => self.with_precision(tracking, &precision, exact),
         }
     }
 
@@ -1074,6 +1081,7 @@ impl Alignment {
         support: &Range<usize>,
         fit: &Fit,
         averaged: Option<Averaged>,
+        exact: bool,
     ) -> Option<Precision> {
         let within = support.start - start..support.end - start;
         let (window_power, fourths) = self.window_moments(&within);
@@ -1123,7 +1131,9 @@ impl Alignment {
             }
         };
         let noise = Autoregression::fit(&e[judged.clone()], window_power * window_power / fourths / grid.step as f64);
-        let changes = {
+        let changes = if exact {
+            Changes::NONE
+        } else {
             let window = window.map(|w| &w[judged.clone()]);
             Changes::of(&noise, [&e[judged.clone()], &y[judged.clone()], &v[judged.clone()]], window, &influence)
         };
@@ -1248,18 +1258,21 @@ struct Score {
 
 /// The derivative of the objective with respect to the delay, up to a positive factor, at `tau` and the best gain.
 fn score(p: &Products, tau: f64, target_noise: &TargetNoise<'_>) -> Option<Score> {
-    let taps = Taps::at(fraction(tau).1);
+    let at = fraction(tau).1;
     let correlate = |correlation: &[f64; NODES], a: &[f64; NODES], b: &[f64; NODES]| -> f64 {
         let terms = (0..NODES).flat_map(|i| (0..NODES).map(move |j| (i, j)));
         terms.map(|(i, j)| a[i] * b[j] * correlation[i.abs_diff(j)]).sum()
     };
     let mut clean = *p;
-    let (gain, noise, correlation) = match *target_noise {
+    let (gain, noise, known) = match *target_noise {
         TargetNoise::None => (p.oy / p.yy, 0.0, None),
         TargetNoise::Known(correlation, noise) => {
-            (p.oy / (p.yy - noise * correlate(correlation, &taps.value, &taps.value)), noise, Some(correlation))
+            let taps = Taps::at(at);
+            let own = noise * correlate(correlation, &taps.value, &taps.value);
+            (p.oy / (p.yy - own), noise, Some((correlation, taps)))
         }
         TargetNoise::Ratio(correlation, ratio) => {
+            let taps = Taps::at(at);
             // Noise variances of measured over target; what interpolation leaves of the latter.
             let lambda = 1.0 / (ratio * ratio);
             let g = correlate(correlation, &taps.value, &taps.value);
@@ -1272,11 +1285,11 @@ fn score(p: &Products, tau: f64, target_noise: &TargetNoise<'_>) -> Option<Score
                 (root - difference) / (2.0 * g * p.oy)
             };
             let residual = p.oo - 2.0 * gain * p.oy + gain * gain * p.yy;
-            (gain, residual.max(0.0) / (lambda + gain * gain * g), Some(correlation))
+            (gain, residual.max(0.0) / (lambda + gain * gain * g), Some((correlation, taps)))
         }
     };
     let mut own = 0.0;
-    if let Some(correlation) = correlation
+    if let Some((correlation, taps)) = known
         && noise > 0.0
     {
         own = noise * correlate(correlation, &taps.value, &taps.value);
