@@ -250,6 +250,43 @@ impl NullaryFnOnce for Weigh<'_> {
     }
 }
 
+/// Bins whose cosines are made from one coarse and one fine angle.
+const FINE_ANGLES: usize = 64;
+
+/// cos of the frequencies of bins that follow each other, cos(a + b) = cos a cos b - sin a sin b: a table of them all would
+/// be as large as the samples.
+#[derive(Debug, Clone)]
+pub(crate) struct Cosines {
+    n_bins: usize,
+    /// cos and sin at every 64th bin, and of the angles from there on.
+    coarse: Vec<[f64; 2]>,
+    fine: [[f64; 2]; FINE_ANGLES],
+}
+
+impl Cosines {
+    /// Of `n_bins` bins from `first` on, `radians` apart.
+    pub(crate) fn new(radians: f64, first: usize, n_bins: usize) -> Self {
+        let at = |bin: usize| [(bin as f64 * radians).cos(), (bin as f64 * radians).sin()];
+        let coarse = (0..n_bins.div_ceil(FINE_ANGLES)).map(|k| at(first + k * FINE_ANGLES)).collect();
+        Self { n_bins, coarse, fine: std::array::from_fn(at) }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.n_bins
+    }
+
+    /// Of the `k`-th of the bins.
+    #[inline(always)]
+    pub(crate) fn at(&self, k: usize) -> f64 {
+        let ([c, s], [fine_c, fine_s]) = (self.coarse[k / FINE_ANGLES], self.fine[k % FINE_ANGLES]);
+        c * fine_c - s * fine_s
+    }
+
+    pub(crate) fn iter(&self) -> impl Iterator<Item = f64> + '_ {
+        (0..self.n_bins).map(|k| self.at(k))
+    }
+}
+
 /// Which combinations of displacement and velocity give the estimates: U = sum_j weights_j G_j, G = (y, y') at the bins.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Influence {
@@ -324,12 +361,12 @@ pub(crate) struct Precision {
     pub(crate) coherent: bool,
 }
 
-/// Adds up, cell by cell, what is needed of the bins. `cosines[k - first]` is cos of the bin's frequency in radians a sample.
+/// Adds up, cell by cell, what is needed of the bins. `cosines` are those of the bins' frequencies in radians a sample.
 pub(crate) struct Spread<'a> {
     cells: &'a mut [Cell],
     width: usize,
     first: usize,
-    cosines: &'a [f64],
+    cosines: &'a Cosines,
     correction: Option<&'a [f64]>,
     whitening: [f64; MAX_ORDER + 1],
     /// The noise is not white.
@@ -373,7 +410,7 @@ impl<'a> Spread<'a> {
     pub(crate) fn new(
         state: &'a mut SpreadState,
         first: usize,
-        cosines: &'a [f64],
+        cosines: &'a Cosines,
         correction: Option<&'a [f64]>,
         noise: &Autoregression,
         influence: Influence,
@@ -535,9 +572,9 @@ impl Sink for Spread<'_> {
         let at = bins.first - self.first;
         let mut whitening = [self.whitening[0]; W];
         if self.coloured {
-            let cosines: &[f64; W] = self.cosines[at..at + W].try_into().expect("W of them");
+            let cosines: [f64; W] = std::array::from_fn(|i| self.cosines.at(at + i));
             // cos(l omega) by the recurrence of Chebyshev's polynomials.
-            let (mut before, mut now) = ([1.0; W], *cosines);
+            let (mut before, mut now) = ([1.0; W], cosines);
             for l in 1..=MAX_ORDER {
                 for i in 0..W {
                     whitening[i] += 2.0 * self.whitening[l] * now[i];

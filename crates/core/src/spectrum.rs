@@ -195,7 +195,8 @@ impl Spectrum {
 
     /// Room for the packed transform of one signal.
     pub(crate) fn packed(&self) -> Vec<Complex<f64>> {
-        vec![Complex::new(0.0, 0.0); self.packed_len()]
+        // Zeroed by the system: of what is never touched, nothing becomes resident.
+        bytemuck::zeroed_vec(self.packed_len())
     }
 
     pub(crate) fn packed_len(&self) -> usize {
@@ -207,7 +208,7 @@ impl Spectrum {
         let input_len =
             if self.cascade.is_empty() { 0 } else { (input_len + ALIGNMENT / size_of::<f64>()).div_ceil(2) };
         Scratch {
-            transform: vec![Complex::new(0.0, 0.0); self.transform.fft.get_inplace_scratch_len().max(input_len)],
+            transform: bytemuck::zeroed_vec(self.transform.fft.get_inplace_scratch_len().max(input_len)),
             passes: vec![0.0; self.cascade.scratch_len()],
         }
     }

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::error::Result;
+use crate::noise::Cosines;
 use crate::spectrum::{Spectrum, SpectrumConfig};
 use crate::sums;
 
@@ -15,13 +16,13 @@ pub(super) struct Grid {
     /// What makes good the droop of the cascade, or of the averages.
     pub(super) correction: Option<Vec<f64>>,
     /// cos of the bins' frequencies, in radians a sample (after averaging).
-    pub(super) cosines: Vec<f64>,
+    pub(super) cosines: Cosines,
 }
 
 impl Grid {
     pub(super) fn new(config: SpectrumConfig) -> Result<Self> {
         let spectrum = Spectrum::new(config)?;
-        let cosines = radians(&spectrum, config.rate_hz).map(f64::cos).collect();
+        let cosines = cosines(&spectrum, config.rate_hz);
         Ok(Self { step: 1, average: false, correction: spectrum.correction(), spectrum, cosines })
     }
 
@@ -35,7 +36,7 @@ impl Grid {
             Spectrum::new(SpectrumConfig { n_samples: config.n_samples.div_ceil(step), rate_hz, band_hz, ..config })?;
         let gain = |w: f64| (0.5 * w * step as f64).sin() / (0.5 * w).sin();
         let correction = Some(radians(&spectrum, config.rate_hz).map(|w| (step * step) as f64 / gain(w)).collect());
-        let cosines = radians(&spectrum, rate_hz).map(f64::cos).collect();
+        let cosines = cosines(&spectrum, rate_hz);
         Ok(Self { spectrum, step, average: true, correction, cosines })
     }
 
@@ -65,6 +66,11 @@ impl Grid {
     pub(super) fn shortened(&self, within: &Range<usize>) -> Range<usize> {
         within.start.div_ceil(self.step)..within.end / self.step
     }
+}
+
+fn cosines(spectrum: &Spectrum, rate_hz: f64) -> Cosines {
+    let radians = 2.0 * std::f64::consts::PI * spectrum.delta_f_hz() / rate_hz;
+    Cosines::new(radians, spectrum.first(), spectrum.n_bins())
 }
 
 /// Frequencies of the kept bins, in radians a sample of `rate_hz`.

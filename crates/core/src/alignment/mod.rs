@@ -72,6 +72,12 @@ const SLOW_SHARE: f64 = 0.01;
 const MAX_SCALES: usize = 16;
 /// Above a third of the rate, where samples are too far apart to be read between, this share of the target's energy may lie.
 const FAST_SHARE: f64 = 1e-4;
+/// How white noise correlates between samples.
+const WHITE: [f64; NODES] = {
+    let mut correlation = [0.0; NODES];
+    correlation[0] = 1.0;
+    correlation
+};
 /// Samples that a lower rate leaves, at least and at most.
 const MIN_DECIMATED: usize = 256;
 const MAX_DECIMATED: usize = 1 << 19;
@@ -277,12 +283,17 @@ impl Alignment {
             .transpose()?
             .map(|grid| Low::new(grid, window.as_deref(), false));
         let kept = Grid::new(plan)?;
+        let in_time = config.estimator == Estimator::LeastSquares && undecimated && exact_target;
         Ok(Self {
             estimator: config.estimator,
             n_samples,
             rate_hz,
-            correlation: std::array::from_fn(|l| if l == 0 { 1.0 } else { 0.0 }),
-            correlation_in_bins: weighting::correlation(kept.cosines.iter().map(|c| (1.0, *c))),
+            correlation: WHITE,
+            correlation_in_bins: if in_time {
+                WHITE
+            } else {
+                weighting::correlation(kept.cosines.iter().map(|c| (1.0, c)))
+            },
             levels: Vec::new(),
             max_delay: config.max_delay_s * rate_hz,
             noise: config.noise,
@@ -294,7 +305,7 @@ impl Alignment {
             search: Search::new(n_samples, rate_hz, config.max_delay_s),
             kept,
             low,
-            in_time: config.estimator == Estimator::LeastSquares && undecimated && exact_target,
+            in_time,
             arch: Arch::new(),
         })
     }

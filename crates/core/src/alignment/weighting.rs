@@ -3,6 +3,7 @@
 use num_complex::Complex;
 
 use crate::lagrange::NODES;
+use crate::noise::Cosines;
 use crate::spectrum::{Bins, Sink};
 
 /// Energy of the target over its noise from which a few bins count: of noise alone it happens once in 10,000.
@@ -34,11 +35,11 @@ impl Weighting {
     }
 
     /// What follows from the weights.
-    pub(super) fn refresh(&mut self, correction: Option<&[f64]>, cosines: &[f64]) {
+    pub(super) fn refresh(&mut self, correction: Option<&[f64]>, cosines: &Cosines) {
         for (k, (weight, factor)) in self.weights.iter().zip(&mut self.factors).enumerate() {
             *factor = weight.sqrt() * correction.map_or(1.0, |c| c[k]);
         }
-        self.correlation = correlation(self.weights.iter().copied().zip(cosines.iter().copied()));
+        self.correlation = correlation(self.weights.iter().copied().zip(cosines.iter()));
     }
 }
 
