@@ -329,7 +329,7 @@ pub(crate) struct Sampling {
 #[derive(Debug, Clone, Copy, Default)]
 struct Cell {
     n: f64,
-    /// |U|^2 / |A|^2 of gain and delay, and |U|^2.
+    /// |U|^2 / |A|^2 of gain and delay, and |U|^2 where |A| is not 1.
     gain: [f64; LANES],
     delay: [f64; LANES],
     gain_as_is: [f64; LANES],
@@ -617,8 +617,10 @@ impl Sink for Spread<'_> {
             let (gain, delay) = (form(gain), form(delay));
             cell.gain[i] += noise * gain;
             cell.delay[i] += noise * delay;
-            cell.gain_as_is[i] += weight[i] * weight[i] * gain;
-            cell.delay_as_is[i] += weight[i] * weight[i] * delay;
+            if self.coloured {
+                cell.gain_as_is[i] += weight[i] * weight[i] * gain;
+                cell.delay_as_is[i] += weight[i] * weight[i] * delay;
+            }
             cell.leverage[i] += weight[i] * form(leverage);
             // What is not in the fit, for it is mostly noise, is not asked whether the residual follows it.
             cell.target[i] += if weight[i] > 0.0 { yy } else { 0.0 };
