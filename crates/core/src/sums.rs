@@ -64,6 +64,35 @@ pub(crate) fn moment(samples: &[f64], centre: f64, level: f64) -> f64 {
     Arch::new().dispatch(Fold { samples, f: |i, x| (i as u32 as f64 - centre) * (x - level) })
 }
 
+/// x_i <- x_i w_i
+pub(crate) fn multiply(samples: &mut [f64], factors: &[f64]) {
+    struct Multiply<'a>(&'a mut [f64], &'a [f64]);
+    impl NullaryFnOnce for Multiply<'_> {
+        type Output = ();
+
+        #[inline(always)]
+        fn call(self) {
+            self.0.iter_mut().zip(self.1).for_each(|(x, w)| *x *= w);
+        }
+    }
+    Arch::new().dispatch(Multiply(samples, factors));
+}
+
+/// x_i <- x_i - a y_i - b z_i
+pub(crate) fn subtract(samples: &mut [f64], (a, first): (f64, &[f64]), (b, second): (f64, &[f64])) {
+    struct Subtract<'a>(&'a mut [f64], f64, &'a [f64], f64, &'a [f64]);
+    impl NullaryFnOnce for Subtract<'_> {
+        type Output = ();
+
+        #[inline(always)]
+        fn call(self) {
+            let Self(samples, a, first, b, second) = self;
+            samples.iter_mut().zip(first).zip(second).for_each(|((x, y), z)| *x -= a * y + b * z);
+        }
+    }
+    Arch::new().dispatch(Subtract(samples, a, first, b, second));
+}
+
 /// r_l = sum x_i x_(i+l), l = 0 .. N - 1.
 pub(crate) fn lag_products<const N: usize>(samples: &[f64]) -> [f64; N] {
     struct LagProducts<'a, const N: usize>(&'a [f64]);

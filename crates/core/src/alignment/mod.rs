@@ -909,7 +909,7 @@ impl Alignment {
             line.subtract_from(samples);
         }
         if let Some(window) = &self.window {
-            taper(samples, &window[within.clone()]);
+            sums::multiply(samples, &window[within.clone()]);
         }
     }
 
@@ -921,9 +921,7 @@ impl Alignment {
         let total = sums::sum(measured);
         let spread = sums::energy(measured) - total * total / measured.len() as f64;
         let (gain, step) = (fit.gain, fit.step);
-        for ((o, y), v) in measured.iter_mut().zip(&shifted[within.clone()]).zip(&slope[within]) {
-            *o -= gain * (y - step * v);
-        }
+        sums::subtract(measured, (gain, &shifted[within.clone()]), (-gain * step, &slope[within]));
         if spread > 0.0 { 1.0 - sums::energy(measured) / spread } else { f64::NAN }
     }
 
@@ -1160,7 +1158,7 @@ impl Alignment {
         for ((signal, bins), stands) in [(&mut *y, &mut *yk), (&mut *v, &mut *vk)].into_iter().zip(stand) {
             let tapered = window.filter(|_| !folded_up);
             if let Some(window) = tapered {
-                taper(signal, window);
+                sums::multiply(signal, window);
             }
             if !stands || tapered.is_some() {
                 spectrum.transform_one(scratch, signal, None, bins);
@@ -1383,10 +1381,6 @@ impl Motion {
         }
         factor
     }
-}
-
-fn taper(samples: &mut [f64], window: &[f64]) {
-    samples.iter_mut().zip(window).for_each(|(v, w)| *v *= w);
 }
 
 /// How far from a peak of a search by steps of so many samples its place is looked for.
