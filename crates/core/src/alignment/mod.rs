@@ -1159,6 +1159,10 @@ impl Alignment {
             let tapered = window.filter(|_| !folded_up);
             if let Some(window) = tapered {
                 sums::multiply(signal, window);
+                // The mean, or line, that is taken from measured before the window lets through what is far from the target.
+                if let Some(line) = self.detrend.line(&signal[judged.clone()]) {
+                    line.subtract_from(&mut signal[judged.clone()]);
+                }
             }
             if !stands || tapered.is_some() {
                 spectrum.transform_one(scratch, signal, None, bins);
