@@ -96,6 +96,8 @@ impl Autoregression {
     }
 }
 
+/// Noise whose changes alter a variance by more than this share is not steady.
+const UNSTEADY: f64 = 0.3;
 /// Samples that are whitened at once.
 const STRIP: usize = 64;
 /// Lanes of the sums over them.
@@ -110,26 +112,36 @@ pub(crate) struct Changes {
     /// Relative variances of these quotients.
     gain_uncertainty: f64,
     delay_uncertainty: f64,
+    /// sum h^2 eps^2 itself, times a factor, of gain and delay: what the variances are at least where eps is not steady.
+    least: [f64; 2],
     /// n sum s^4 / (sum s^2)^2 of its strength s: 1 where it is steady, n over the number of samples that hold it all.
     pub(crate) concentration: f64,
 }
 
 impl Changes {
     /// No changes.
-    pub(crate) const NONE: Self =
-        Self { gain: 1.0, delay: 1.0, gain_uncertainty: 0.0, delay_uncertainty: 0.0, concentration: 1.0 };
+    pub(crate) const NONE: Self = Self {
+        gain: 1.0,
+        delay: 1.0,
+        gain_uncertainty: 0.0,
+        delay_uncertainty: 0.0,
+        least: [0.0; 2],
+        concentration: 1.0,
+    };
 
     /// How many pieces of noise that is strong for a while are alike.
     fn alike(&self) -> f64 {
         self.concentration.min(MOST_ALIKE)
     }
 
-    /// From the residual e, displacement y and velocity y' (all windowed alike, by `window` where there is one).
+    /// From the residual e, displacement y and velocity y' (all windowed alike, by `window` where there is one). `scale` makes a
+    /// variance of sum h^2 eps^2; zero where it is none.
     pub(crate) fn of(
         noise: &Autoregression,
         [residual, y, velocity]: [&[f64]; 3],
         window: Option<&[f64]>,
         influence: &Influence,
+        scale: f64,
     ) -> Self {
         let sums = Arch::new().dispatch(Weigh { noise, residual, y, velocity, window, influence });
         let Moments { eps, weight, fourth, of } = sums;
@@ -146,6 +158,7 @@ impl Changes {
             delay: ratio(delay),
             gain_uncertainty: uncertainty(gain),
             delay_uncertainty: uncertainty(delay),
+            least: [gain, delay].map(|m| if (ratio(m) - 1.0).abs() > UNSTEADY { scale * m.noisy } else { 0.0 }),
             concentration: (n * fourth / (3.0 * eps * eps)).max(1.0),
         };
         let known = [found.gain, found.delay, found.gain_uncertainty, found.delay_uncertainty, found.concentration];
@@ -496,9 +509,10 @@ impl<'a> Spread<'a> {
         // An autoregression that has a tone to describe tilts what lies far from it.
         let larger = |a: Variance, b: Variance| if b.value > a.value { b } else { a };
         let (gain, delay) = (larger(gain, gain_as_is), larger(delay, delay_as_is));
-        let Changes { concentration, .. } = self.changes;
-        let gain = gain.changed(self.changes.gain, self.changes.gain_uncertainty, concentration);
-        let delay = delay.changed(self.changes.delay, self.changes.delay_uncertainty, concentration);
+        let Changes { concentration, least: [least_gain, least_delay], .. } = self.changes;
+        let gain = gain.changed(self.changes.gain, self.changes.gain_uncertainty, concentration).at_least(least_gain);
+        let delay =
+            delay.changed(self.changes.delay, self.changes.delay_uncertainty, concentration).at_least(least_delay);
         let (coherence, coherent) = self.coherence();
         Some(Precision {
             gain_std: gain.value.sqrt(),
@@ -558,6 +572,16 @@ impl Variance {
         let relative =
             2.0 * self.uncertainty / (self.value * self.value) * 0.5 * concentration + 0.5 * relative_variance;
         Self { value, uncertainty: relative * value * value }
+    }
+
+    /// The same, as well known, where it is not below `least`.
+    fn at_least(&self, least: f64) -> Self {
+        let factor = (least / self.value).max(1.0);
+        if factor.is_finite() {
+            Self { value: self.value * factor, uncertainty: self.uncertainty * factor * factor }
+        } else {
+            *self
+        }
     }
 
     fn reach(&self) -> f64 {

@@ -1144,7 +1144,9 @@ impl Alignment {
             Changes::NONE
         } else {
             let window = window.map(|w| &w[judged.clone()]);
-            Changes::of(&noise, [&e[judged.clone()], &y[judged.clone()], &v[judged.clone()]], window, &influence)
+            // Of sums over samples; the influence is that of sums over bins.
+            let scale = if self.in_time { (to_bins * grid.step as f64).powi(2) } else { 0.0 };
+            Changes::of(&noise, [&e[judged.clone()], &y[judged.clone()], &v[judged.clone()]], window, &influence, scale)
         };
         let spectrum = &grid.spectrum;
         let [yk, vk, ek] = bins.each_mut().map(|b| &mut b[..spectrum.packed_len()]);
