@@ -407,11 +407,30 @@ impl Alignment {
         let own = &view.target[start - view.origin..start + self.n_samples - view.origin];
         let most = self.levels.last().map_or(1, |l| l.decimator.factor());
         let slowest = motion.slowest(own, most);
-        let Some(i) = self.levels.iter().rposition(|l| l.decimator.factor() <= slowest) else {
-            state.target_noise = motion.noise;
-            return self.judge(state, view, start, expected);
+        let level = self.levels.iter().rposition(|l| l.decimator.factor() <= slowest);
+        let mut found = match level {
+            Some(level) => self.judge_lower(state, view, start, expected, motion.noise, level),
+            None => Err(Reason::TooShort { n_samples: 0 }),
         };
-        let Level { decimator, variance, alignment } = &self.levels[i];
+        // A lower rate's filter needs samples at both ends.
+        if matches!(found, Err(Reason::TooShort { .. })) {
+            state.target_noise = motion.noise;
+            found = self.judge(state, view, start, expected);
+        }
+        found.map(|tracking| Tracking { target_noise: motion.noise.sqrt(), ..tracking })
+    }
+
+    /// The same at one of the lower rates; `noise` is the variance of the target's own.
+    fn judge_lower(
+        &self,
+        state: &mut AlignmentState,
+        view: &View<'_>,
+        start: usize,
+        expected: Option<f64>,
+        noise: f64,
+        level: usize,
+    ) -> std::result::Result<Tracking, Reason> {
+        let Level { decimator, variance, alignment } = &self.levels[level];
         let (factor, delay) = (decimator.factor(), decimator.delay());
         // Of the samples at start + k factor, k from -margin on, those for which the filter is full.
         let margin = alignment.margin() as isize;
@@ -425,11 +444,11 @@ impl Alignment {
         decimator.block(&view.target[from..], &mut target[..n]);
         decimator.block(&view.measured[from..], &mut measured[..n]);
         let view = View { target: &target[..n], measured: &measured[..n], origin: (first + margin) as usize };
-        let lower = &mut state.levels[i];
-        lower.target_noise = motion.noise * variance;
+        let lower = &mut state.levels[level];
+        lower.target_noise = noise * variance;
         let found = alignment.judge(lower, &view, margin as usize, expected.map(|d| d / factor as f64));
         state.decimated = [target, measured];
-        found.map(|tracking| Tracking { target_noise: motion.noise.sqrt(), ..tracking })
+        found
     }
 
     /// Gain and delay with their precision; the state says how noisy the target is.
