@@ -123,8 +123,17 @@ struct Correlated {
     step: usize,
     /// Cycles that the target moves through.
     cycles: f64,
-    /// The highest of them, of lags from a given one on.
-    highest: f64,
+}
+
+impl Correlated {
+    /// How high the highest peak is of lags and leads longer than `reach` samples.
+    fn highest_beyond(&self, correlations: &[f64], reach: usize) -> Option<f64> {
+        let tops = (1..2 * self.lags).filter(|k| k.abs_diff(self.lags) * self.step > reach).filter_map(|k| {
+            let [before, here, after] = [correlations[k - 1], correlations[k], correlations[k + 1]];
+            (here >= before && here > after).then(|| summit(before, here, after).1)
+        });
+        tops.max_by(f64::total_cmp)
+    }
 }
 
 impl Search {
@@ -162,7 +171,7 @@ impl Search {
     ) -> Result<Peaks, Reason> {
         let outside = start.saturating_sub(view.origin).min(view.end().saturating_sub(start + self.n_samples));
         let reach = self.reach.min(outside.max(self.n_samples / 4)) / self.max_step * self.max_step;
-        let near = self.correlate(state, view, start, reach, 0)?;
+        let near = self.correlate(state, view, start, reach)?;
         if near.cycles < MIN_CYCLES {
             return Err(Reason::FewCycles { found: near.cycles });
         }
@@ -177,7 +186,8 @@ impl Search {
             let farther = (FARTHER.min(near.step) * reach).min(2 * self.n_samples / 5) / self.max_step * self.max_step;
             let left = 1.0 - highest.max(if opposite { -lowest } else { 0.0 });
             if farther > reach
-                && self.correlate(state, view, start, farther, reach).is_ok_and(|far| 1.0 - far.highest < LEFT * left)
+                && let Ok(far) = self.correlate(state, view, start, farther)
+                && far.highest_beyond(&state.correlations, reach).is_some_and(|there| 1.0 - there < LEFT * left)
             {
                 return Err(Reason::BeyondMaxDelay { max_delay_s: reach as f64 / self.rate_hz });
             }
@@ -191,14 +201,13 @@ impl Search {
         Ok(found)
     }
 
-    /// Correlates at lags of up to `reach` samples to either side; the highest is of those from `inner` on.
+    /// Correlates at lags of up to `reach` samples to either side.
     fn correlate(
         &self,
         state: &mut SearchState,
         view: &View<'_>,
         start: usize,
         reach: usize,
-        inner: usize,
     ) -> Result<Correlated, Reason> {
         let mut from = start.max(view.origin + reach);
         let mut to = (start + self.n_samples).min(view.end().saturating_sub(reach));
@@ -247,15 +256,11 @@ impl Search {
         let round_off = 1e-13 * sums::energy(target);
         let (mut sum, mut squares): (f64, f64) = target[..n].iter().fold((0.0, 0.0), |(s, q), v| (s + v, q + v * v));
         let mut moved = false;
-        let mut highest = f64::NEG_INFINITY;
         for k in 0..correlations.len() {
             let own = squares - sum * sum / n as f64;
             let comparable = own > round_off && spread > 0.0;
             moved |= comparable;
             correlations[k] = if comparable { correlations[k] / (own.sqrt() * spread.sqrt()) } else { 0.0 };
-            if k.abs_diff(lags) * step >= inner {
-                highest = highest.max(correlations[k]);
-            }
             if k + 1 < correlations.len() {
                 let (leaves, enters) = (target[k], target[k + n]);
                 sum += enters - leaves;
@@ -265,7 +270,7 @@ impl Search {
         if !moved {
             return Err(Reason::Still);
         }
-        Ok(Correlated { lags, step, cycles, highest })
+        Ok(Correlated { lags, step, cycles })
     }
 }
 

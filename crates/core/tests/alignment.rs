@@ -339,3 +339,131 @@ fn odd_samples_are_answered() {
         }
     }
 }
+
+/// A tone that begins and ends slowly tells its turn by its ends alone: every one of the turns within reach is compared.
+#[test]
+fn no_turn_of_a_tone_is_taken_for_another() {
+    let n = 20_480;
+    let ramp = |t: f64| (t / 2.0).min((20.0 - t) / 2.0).clamp(0.0, 1.0);
+    for frequency_hz in [12.0, 13.0, 15.0, 17.0, 20.0, 30.0] {
+        let tone = |t: f64| ramp(t) * (2.0 * PI * frequency_hz * t).sin();
+        for (draw, delay_s) in [-0.02, 0.0, 0.012, 0.04].into_iter().enumerate() {
+            let errors = noise(n, 11 + draw as u64);
+            let target: Vec<f64> = (0..n).map(|i| tone(i as f64 / RATE_HZ)).collect();
+            let measured: Vec<f64> =
+                (0..n).map(|i| 0.95 * tone(i as f64 / RATE_HZ - delay_s) + 0.02 * errors[i]).collect();
+            let found = evaluate(&target, &measured, least_squares());
+            assert!((found.delay_s - delay_s).abs() < 1e-4, "{frequency_hz} {delay_s}: {found:?}");
+            // Less than half a period away, the delay that is expected tells the turn of any stretch of it.
+            for off in [-0.4, 0.4] {
+                let config =
+                    EvaluatorConfig { expected_delay_s: Some(delay_s + off / frequency_hz), ..least_squares() };
+                let middle = 8192..12_288;
+                let found = evaluate(&target[middle.clone()], &measured[middle], config);
+                assert!((found.delay_s - delay_s).abs() < 1e-3, "{frequency_hz} {delay_s} {off}: {found:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_two_turns_that_are_told_are_neighbours_and_the_nearest_to_no_delay() {
+    let tone = |t: f64| (2.0 * PI * 20.0 * t).sin();
+    let target: Vec<f64> = (0..8192).map(|i| tone(i as f64 / RATE_HZ)).collect();
+    let measured: Vec<f64> = (0..8192).map(|i| tone(i as f64 / RATE_HZ - 0.012)).collect();
+    match evaluate(&target, &measured, least_squares()).reason {
+        Some(Reason::Ambiguous { delay_s, other_s }) => {
+            assert!((delay_s - 0.012).abs() < 1e-6, "{delay_s}");
+            assert!(((other_s - delay_s).abs() - 0.05).abs() < 1e-6, "{other_s}");
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+/// With noise of its own on the target, plain least squares is drawn to half samples by hundreds of microseconds.
+#[test]
+fn noise_on_the_target_draws_the_delay_to_no_fraction_of_a_sample() {
+    let n = 30_720;
+    let motion = |t: f64| (2.0 * PI * 0.3 * t).sin() + 0.4 * (2.0 * PI * 1.1 * t + 1.0).sin();
+    for share in [0.003, 0.03] {
+        for fraction in [0.0, 0.25, 0.5, 0.75] {
+            let delay_s = (7.0 + fraction) / RATE_HZ;
+            let (mut error, mut square, mut held) = (0.0, 0.0, 0);
+            const DRAWS: u64 = 24;
+            for draw in 0..DRAWS {
+                let (first, second) = (noise(n, 100 + draw), noise(n, 900 + draw));
+                let noisy = |late: f64, gain: f64, errors: &[f64]| -> Vec<f64> {
+                    (0..n).map(|i| gain * (motion(i as f64 / RATE_HZ - late) + share * errors[i])).collect()
+                };
+                let found = evaluate(
+                    &noisy(0.0, 1.0, &first),
+                    &noisy(delay_s, 0.95, &second),
+                    EvaluatorConfig { detrend: Detrend::Mean, ..least_squares() },
+                );
+                assert!((found.target_noise / share - 1.0).abs() < 0.1, "{found:?}");
+                error += (found.delay_s - delay_s) / DRAWS as f64;
+                square += (found.delay_s - delay_s).powi(2) / DRAWS as f64;
+                let (low, high) = found.delay_interval_s;
+                held += usize::from(low <= delay_s && delay_s <= high);
+            }
+            // Four standard errors of a mean; of 24 draws 19 hold but once in 500 times.
+            assert!(error.abs() < 4.0 * (square / DRAWS as f64).sqrt(), "{share} {fraction}: {error} {square}");
+            assert!(held >= 19, "{share} {fraction}: {held}");
+        }
+    }
+}
+
+#[test]
+fn a_clean_target_is_taken_for_exact_and_so_is_a_high_motion_that_measured_follows() {
+    let n = 8192;
+    for high_hz in [40.0, 90.0, 120.0] {
+        let motion = |t: f64| (2.0 * PI * 2.0 * t).sin() + 0.3 * (2.0 * PI * high_hz * t + 0.3).sin();
+        let errors = noise(n, 5);
+        let target: Vec<f64> = (0..n).map(|i| motion(i as f64 / RATE_HZ)).collect();
+        let measured: Vec<f64> = (0..n).map(|i| 0.9 * motion(i as f64 / RATE_HZ - 0.0123) + 0.01 * errors[i]).collect();
+        let found = evaluate(&target, &measured, least_squares());
+        assert_eq!(found.target_noise, 0.0, "{high_hz}");
+        assert!((found.delay_s - 0.0123).abs() < 5.0 * found.delay_std_s, "{high_hz}: {found:?}");
+    }
+}
+
+/// Noise as strong as the velocity: the interval of steady noise would hold two of three.
+#[test]
+fn intervals_hold_where_the_noise_follows_the_velocity() {
+    let n = 12_288;
+    let motion = |t: f64| (2.0 * PI * 1.3 * t).sin() + 0.6 * (2.0 * PI * 2.9 * t + 1.0).cos();
+    let target: Vec<f64> = (0..n).map(|i| motion(i as f64 / RATE_HZ)).collect();
+    const DRAWS: u64 = 200;
+    let (mut held, mut steady) = (0, 0);
+    for draw in 0..DRAWS {
+        let errors = noise(n, 3000 + draw);
+        let measured: Vec<f64> = (0..n)
+            .map(|i| {
+                let t = i as f64 / RATE_HZ - 0.0123;
+                let velocity = (motion(t + 1e-4) - motion(t - 1e-4)) / 2e-4;
+                0.95 * motion(t) + 0.001 * velocity * errors[i]
+            })
+            .collect();
+        let found = evaluate(&target, &measured, EvaluatorConfig { detrend: Detrend::Mean, ..least_squares() });
+        let (low, high) = found.delay_interval_s;
+        held += usize::from(low <= 0.0123 && 0.0123 <= high);
+        steady += usize::from((found.delay_s - 0.0123).abs() < 1.96 * found.delay_std_s / 1.5);
+    }
+    assert!((181..=200).contains(&held), "{held} of {DRAWS}");
+    assert!(steady < held, "the noise is not steady");
+}
+
+#[test]
+fn a_delay_out_of_reach_is_not_an_opposite_sign() {
+    let n = 20_480;
+    let motion =
+        |t: f64| (-(t - 9.0) * (t - 9.0) / 8.0).exp() * ((2.0 * PI * 1.2 * t).sin() + 0.5 * (2.0 * PI * 3.1 * t).cos());
+    let target: Vec<f64> = (0..n).map(|i| motion(i as f64 / RATE_HZ)).collect();
+    for delay_s in [0.4, -0.4] {
+        let measured: Vec<f64> = (0..n).map(|i| motion(i as f64 / RATE_HZ - delay_s)).collect();
+        let reason = evaluate(&target, &measured, least_squares()).reason;
+        assert!(matches!(reason, Some(Reason::BeyondMaxDelay { .. })), "{delay_s}: {reason:?}");
+    }
+    let measured: Vec<f64> = target.iter().map(|x| -x).collect();
+    assert_eq!(evaluate(&target, &measured, least_squares()).reason, Some(Reason::OppositeSign));
+}

@@ -59,6 +59,28 @@ fn evaluating_allocates_nothing() {
         evaluator.evaluate(&mut state, &pair).unwrap();
         assert_eq!(COUNT.with(Cell::get), before, "{config:?}");
     }
+    // A tone with many turns within reach, and a target with noise of its own.
+    let rough = |i: i32, k: i32| f64::from((i * k) % 1009 - 504) / 504.0;
+    let tone = |t: f64| t.min(1.0) * (125.0 * t).sin();
+    let (high, late): (Vec<f64>, Vec<f64>) =
+        (0..20_000).map(|i| f64::from(i) / 1000.0).map(|t| (tone(t), tone(t - 0.012))).unzip();
+    let noisy = |signal: &[f64], k| -> Vec<f64> { (0..).zip(signal).map(|(i, x)| x + 0.03 * rough(i, k)).collect() };
+    let evaluator = Evaluator::new(
+        target.len(),
+        1000.0,
+        EvaluatorConfig { estimator: Estimator::LeastSquares, detrend: Detrend::Mean, ..Default::default() },
+    )
+    .unwrap();
+    let mut state = evaluator.state();
+    for (target, measured, own) in
+        [(high.clone(), noisy(&late, 7919), false), (noisy(&target, 7907), noisy(&measured, 6007), true)]
+    {
+        let pair = Pair::new(&target, &measured, 1000.0).unwrap();
+        let before = COUNT.with(Cell::get);
+        let found = evaluator.evaluate(&mut state, &pair).unwrap();
+        assert_eq!(COUNT.with(Cell::get), before, "{found:?}");
+        assert_eq!(found.target_noise > 0.0, own, "{found:?}");
+    }
     for (share, direct) in [(0.9, true), (0.99999, false)] {
         let evaluator = EvaluatorConfig::default();
         let key = KeyFrequencies::new(&target, 1000.0, KeyFrequenciesConfig { share, evaluator }).unwrap();
