@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 _Averaged = tuple[float, float, float, float, complex]
-_Precision = tuple[float, tuple[float, float], float, tuple[float, float], float, float, str]
+_Precision = tuple[float, tuple[float, float], float, tuple[float, float], float, float, float, str]
 _Numbers = tuple[_Averaged, _Precision]
 _Array = NDArray[np.float64]
 _Readings = tuple[

@@ -169,7 +169,7 @@ def assess(
     limits = limits or Limits()
     names = (target_name, measured_name)
     units = (unit, measured_unit or unit)
-    warnings = words.warnings(t, m, tracking, moving, response, units, names)
+    warnings = words.warnings(t, m, tracking, trusted, moving, response, units, names)
     argument, said = words.argument(t, tracking, trusted, trusted_moving, slopes, variants, warnings)
     evaluation = dataclasses.asdict(tracking.settings) | _factor_settings(factors)
     evaluation["expected_delay_s"] = trusted_settings.expected_delay_s

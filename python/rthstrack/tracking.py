@@ -175,7 +175,7 @@ def _time_s(n_samples: int, rate_hz: float) -> NDArray[np.float64]:
     return np.arange(n_samples) / rate_hz
 
 
-_SPREADS = ("amplitude_std", "delay_std_s", "residual_coherence", "goodness")
+_SPREADS = ("amplitude_std", "delay_std_s", "residual_coherence", "goodness", "target_noise_std")
 _INTERVALS = ("amplitude_interval", "delay_interval_s")
 
 
@@ -193,7 +193,8 @@ class Tracking(_Result):
     `amplitude_std`, `amplitude_interval`, `delay_std_s`, `delay_interval_s`: standard deviation and 95 % interval, from
     the spectrum of what the fit leaves; `residual_coherence`: how far that still follows the target, 0 to 1;
     `goodness`: the share of measured that one gain and one delay explain. All are NaN for "fei", and where not
-    determined: `reason` says why there is no number, or no interval, and is empty where nothing is missing.
+    determined. `target_noise_std`: standard deviation of the noise that is the target's own, in its unit, where it was
+    taken into account, else 0. `reason` says why there is no number, or no interval, and is empty where nothing is missing.
     With `weights=True` also, per kept bin (n_bins,) or (n_bins, n_actuators): `frequency_hz` (n_bins,), `weights`
     (sum to one), `target_spectrum` and `measured_spectrum` (complex DFT of the windowed, zero-padded signals).
     """
@@ -214,6 +215,7 @@ class Tracking(_Result):
     delay_interval_s: tuple[float, float] | NDArray[np.float64] = (math.nan, math.nan)
     residual_coherence: float | NDArray[np.float64] = math.nan
     goodness: float | NDArray[np.float64] = math.nan
+    target_noise_std: float | NDArray[np.float64] = 0.0
     reason: str | tuple[str, ...] = ""
     frequency_hz: NDArray[np.float64] | None = None
     weights: NDArray[np.float64] | None = None
@@ -265,6 +267,7 @@ class MovingTracking(_Result):
     delay_interval_s: NDArray[np.float64]
     residual_coherence: NDArray[np.float64]
     goodness: NDArray[np.float64]
+    target_noise_std: NDArray[np.float64]
     reason: tuple[str, ...] | tuple[tuple[str, ...], ...]
 
     def _columns(self) -> dict[str, Any]:

@@ -417,6 +417,7 @@ def warnings(
     target: NDArray[np.float64],
     measured: NDArray[np.float64],
     tracking: Tracking,
+    trusted: Tracking,
     moving: MovingTracking | None,
     response: FrequencyResponse | None,
     units: tuple[str | None, str | None] = (None, None),
@@ -435,6 +436,7 @@ def warnings(
         "clipped measured": _clipped(measured, names[1]),
         "drift": _drift(target, tracking, duration_s),
         "noise": _high_energy(tracking),
+        "target noise": _target_noise(target, trusted, names),
         "coherence": _coherence(tracking, response, names),
         "delay spread": _delay_spread(tracking, response),
         "levels": _levels(target, names[0]),
@@ -509,6 +511,18 @@ def _high_energy(tracking: Tracking) -> str | None:
     return (
         f"{100 * share:.1f} % of the weight lies above {edge:.3g} Hz, far above the response: "
         f"noise there counts as motion; try --band or -P"
+    )
+
+
+def _target_noise(target: NDArray[np.float64], trusted: Tracking, names: tuple[str, str]) -> str | None:
+    """That the trusted estimate had to reckon with noise on the target."""
+    noise = float(trusted.target_noise_std)
+    if not noise > 0:
+        return None
+    share = _percent(100 * noise / float(target.std()))
+    return (
+        f"{names[0]} holds noise of its own, {share} % of its standard deviation: the trusted estimate takes it into "
+        "account, the published average does not (--band leaves less of it)"
     )
 
 

@@ -103,6 +103,9 @@ enum rthstrack_reason
     RTHSTRACK_REASON_FEW_BINS = 101,
     // No interval: it is known for weight power 2 only.
     RTHSTRACK_REASON_WEIGHT_POWER = 102,
+    // No interval: the share `reason_values[0]` of the target's motion lies above a third of the rate, too fast to be read
+    // between samples.
+    RTHSTRACK_REASON_TOO_FAST = 103,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L

@@ -95,12 +95,15 @@ pub enum rthstrack_reason {
     RTHSTRACK_REASON_FEW_BINS = 101,
     /// No interval: it is known for weight power 2 only.
     RTHSTRACK_REASON_WEIGHT_POWER = 102,
+    /// No interval: the share `reason_values[0]` of the target's motion lies above a third of the rate, too fast to be read
+    /// between samples.
+    RTHSTRACK_REASON_TOO_FAST = 103,
 }
 
 use rthstrack_reason as Code;
 
 impl Code {
-    const ALL: [Code; 16] = [
+    const ALL: [Code; 17] = [
         Code::RTHSTRACK_REASON_NONE,
         Code::RTHSTRACK_REASON_STILL,
         Code::RTHSTRACK_REASON_NOT_FINITE,
@@ -117,6 +120,7 @@ impl Code {
         Code::RTHSTRACK_REASON_RESIDUAL_FOLLOWS_TARGET,
         Code::RTHSTRACK_REASON_FEW_BINS,
         Code::RTHSTRACK_REASON_WEIGHT_POWER,
+        Code::RTHSTRACK_REASON_TOO_FAST,
     ];
 
     /// The code, and what the reason says in numbers; NaN where it says none.
@@ -141,6 +145,7 @@ impl Code {
             }
             Some(Reason::FewBins) => plain(Code::RTHSTRACK_REASON_FEW_BINS),
             Some(Reason::WeightPower) => plain(Code::RTHSTRACK_REASON_WEIGHT_POWER),
+            Some(Reason::TooFast { share }) => with(Code::RTHSTRACK_REASON_TOO_FAST, share),
             Some(_) => plain(Code::RTHSTRACK_REASON_OTHER),
         }
     }
@@ -169,12 +174,12 @@ impl Code {
                   band with less noise"
             }
             Code::RTHSTRACK_REASON_AMBIGUOUS => {
-                c"not determined: ambiguous, two delays fit equally well; lower max_delay_s below half their \
-                  distance to choose the one near zero"
+                c"not determined: ambiguous, two delays fit equally well; give the one expected \
+                  (expected_delay_s)"
             }
             Code::RTHSTRACK_REASON_BEYOND_MAX_DELAY => {
-                c"not determined: the best delay lies beyond max_delay_s, or beyond a quarter of the window; raise it \
-                  or take a longer window"
+                c"not determined: the delay seems to lie beyond what is searched, max_delay_s or a quarter of the \
+                  window; raise max_delay_s or take a longer window"
             }
             Code::RTHSTRACK_REASON_OPPOSITE_SIGN => {
                 c"not determined: measured moves against target; does one of them have the opposite sign?"
@@ -187,6 +192,9 @@ impl Code {
             }
             Code::RTHSTRACK_REASON_FEW_BINS => c"no interval: too few frequency bins to know the noise by",
             Code::RTHSTRACK_REASON_WEIGHT_POWER => c"no interval: it is known for weight power 2 only",
+            Code::RTHSTRACK_REASON_TOO_FAST => {
+                c"no interval: target moves too fast to be read between samples; sample faster"
+            }
         }
     }
 }
@@ -230,6 +238,7 @@ mod tests {
             Reason::ResidualFollowsTarget { coherence: 0.5 },
             Reason::FewBins,
             Reason::WeightPower,
+            Reason::TooFast { share: 0.5 },
         ];
         for reason in reasons {
             let (code, _) = Code::of(Some(reason));

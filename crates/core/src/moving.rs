@@ -49,6 +49,8 @@ pub struct MovingTracking {
     pub residual_coherence: Vec<f64>,
     /// Share of measured that one gain and one delay explain.
     pub goodness: Vec<f64>,
+    /// Standard deviation of the noise that is the target's own, where it was taken into account.
+    pub target_noise: Vec<f64>,
     /// Whether the window could be judged.
     pub valid: Vec<bool>,
     /// Why it could not, or why there is no interval.
@@ -112,6 +114,7 @@ impl MovingTracking {
             delay_interval_s: Vec::with_capacity(n),
             residual_coherence: Vec::with_capacity(n),
             goodness: Vec::with_capacity(n),
+            target_noise: Vec::with_capacity(n),
             valid: Vec::with_capacity(n),
             reason: Vec::with_capacity(n),
         }
@@ -129,6 +132,7 @@ impl MovingTracking {
         self.delay_interval_s.push(t.delay_interval_s);
         self.residual_coherence.push(t.residual_coherence);
         self.goodness.push(t.goodness);
+        self.target_noise.push(t.target_noise);
         self.valid.push(!t.reason.is_some_and(|r| r.is_undetermined()));
         self.reason.push(t.reason);
     }

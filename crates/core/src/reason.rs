@@ -108,16 +108,16 @@ impl fmt::Display for Reason {
             ),
             Reason::Ambiguous { delay_s, other_s } => write!(
                 f,
-                "not determined: ambiguous, delays of {:.4} and {:.4} ms fit equally well; lower max_delay_s below half \
-                 their distance to choose the one near zero",
+                "not determined: ambiguous, delays of {:.4} and {:.4} ms fit equally well; give the one expected \
+                 (expected_delay_s, --expected-delay)",
                 1e3 * delay_s,
                 1e3 * other_s
             ),
             Reason::BeyondMaxDelay { max_delay_s } => {
                 write!(
                     f,
-                    "not determined: the best delay lies beyond max_delay_s, or beyond a quarter of the samples where the record ends \
-                 with them ({max_delay_s} s); raise it or take a longer window"
+                    "not determined: the delay seems to lie beyond the {max_delay_s} s that are searched, max_delay_s or a quarter of \
+                 the samples; raise max_delay_s or take a longer window"
                 )
             }
             Reason::OppositeSign => {
@@ -131,8 +131,8 @@ impl fmt::Display for Reason {
             ),
             Reason::TooFast { share } => write!(
                 f,
-                "no interval: {:.2} % of target's motion lies above a third of the sample rate, too fast to be read between \
-                 samples; sample faster",
+                "no interval: {:.2} % of target's motion is too fast to be read between samples, above a third of their \
+                 rate; sample faster",
                 100.0 * share
             ),
             Reason::FewBins => write!(f, "no interval: too few frequency bins to know the noise by"),

@@ -465,7 +465,8 @@ impl Welch {
     /// arg H, with the phase of the whole samples put back after unwrapping.
     pub(crate) fn phase_rad(&self, frequency_hz: &[f64], averages: &Averages, coherence: &[f64]) -> Vec<f64> {
         let lag_turns = self.lag as f64 / self.spectrum.fft_len() as f64;
-        let mut phase_rad = unwrap(frequency_hz, &averages.cross, coherence);
+        let aligned = self.lag != 0 || self.rest_s != 0.0;
+        let mut phase_rad = unwrap(frequency_hz, &averages.cross, coherence, aligned);
         for (k, phase) in phase_rad.iter_mut().enumerate() {
             *phase -= 2.0 * PI * (k + 1) as f64 * lag_turns;
         }
@@ -570,22 +571,29 @@ impl Noise {
     }
 }
 
-/// Chooses the turn of each phase nearest to what the delay of the last coherent bin predicts; the first is within half a turn.
-fn unwrap(frequency_hz: &[f64], cross: &[Complex<f64>], coherence: &[f64]) -> Vec<f64> {
-    let mut delay_so_far = 0.0;
-    frequency_hz
-        .iter()
-        .zip(cross.iter().zip(coherence))
-        .map(|(&f, (c, &coherence))| {
-            let wrapped = c.arg();
+/// Chooses the turn of each phase nearest to what the delay of the last coherent bin predicts, going up from the first, which is
+/// within half a turn; of `aligned` segments going up and down from the strongest: bins that hold next to nothing would lead
+/// the others astray.
+fn unwrap(frequency_hz: &[f64], cross: &[Complex<f64>], coherence: &[f64], aligned: bool) -> Vec<f64> {
+    let n = cross.len();
+    let mut phase_rad = vec![0.0; n];
+    let mut lead = |bins: &mut dyn Iterator<Item = usize>, mut delay_so_far: f64| {
+        for k in bins {
+            let (f, wrapped) = (frequency_hz[k], cross[k].arg());
             let predicted = -2.0 * PI * f * delay_so_far;
-            let phase = wrapped + 2.0 * PI * ((predicted - wrapped) / (2.0 * PI)).round();
-            if coherence >= LEADING_COHERENCE {
-                delay_so_far = delay(phase, f);
+            phase_rad[k] = wrapped + 2.0 * PI * ((predicted - wrapped) / (2.0 * PI)).round();
+            if coherence[k] >= LEADING_COHERENCE {
+                delay_so_far = delay(phase_rad[k], f);
             }
-            phase
-        })
-        .collect()
+        }
+    };
+    let strongest = (0..n).filter(|k| aligned && coherence[*k] >= LEADING_COHERENCE);
+    let from = strongest.max_by(|a, b| cross[*a].norm_sqr().total_cmp(&cross[*b].norm_sqr())).unwrap_or(0);
+    lead(&mut (from..n), 0.0);
+    if from > 0 {
+        lead(&mut (0..from).rev(), delay(cross[from].arg(), frequency_hz[from]));
+    }
+    phase_rad
 }
 
 /// Sums over the segments, an entry a bin.

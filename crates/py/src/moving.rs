@@ -12,10 +12,10 @@ type Numbers<'py> = Bound<'py, PyArray1<f64>>;
 type Pairs<'py> = Bound<'py, PyArray2<f64>>;
 
 /// time_s, amplitude, phase_rad, delay_s, equivalent_frequency_hz, valid; amplitude_std, amplitude_interval, delay_std_s,
-/// delay_interval_s, residual_coherence, goodness, reason
+/// delay_interval_s, residual_coherence, goodness, target_noise_std, reason
 type Arrays<'py> = (
     (Numbers<'py>, Numbers<'py>, Numbers<'py>, Numbers<'py>, Numbers<'py>, Bound<'py, PyArray1<bool>>),
-    (Numbers<'py>, Pairs<'py>, Numbers<'py>, Pairs<'py>, Numbers<'py>, Numbers<'py>, Vec<String>),
+    (Numbers<'py>, Pairs<'py>, Numbers<'py>, Pairs<'py>, Numbers<'py>, Numbers<'py>, Numbers<'py>, Vec<String>),
 );
 
 #[pyfunction]
@@ -52,6 +52,7 @@ pub(crate) fn evaluate_moving<'py>(
             pairs(moving.delay_interval_s),
             moving.residual_coherence.into_pyarray(py),
             moving.goodness.into_pyarray(py),
+            moving.target_noise.into_pyarray(py),
             moving.reason.iter().map(|r| words(r.as_ref())).collect(),
         ),
     ))

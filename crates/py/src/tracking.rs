@@ -13,8 +13,9 @@ use crate::signal::Columns;
 
 /// amplitude, phase_rad, delay_s, equivalent_frequency_hz, fei
 type Averaged = (f64, f64, f64, f64, Complex<f64>);
-/// amplitude_std, amplitude_interval, delay_std_s, delay_interval_s, residual_coherence, goodness, reason
-type Precision = (f64, (f64, f64), f64, (f64, f64), f64, f64, String);
+/// amplitude_std, amplitude_interval, delay_std_s, delay_interval_s, residual_coherence, goodness,
+/// target_noise_std, reason
+type Precision = (f64, (f64, f64), f64, (f64, f64), f64, f64, f64, String);
 pub(crate) type Numbers = (Averaged, Precision);
 /// frequency_hz, weights, target_spectrum, measured_spectrum
 type SpectraArrays<'py> = (
@@ -34,6 +35,7 @@ pub(crate) fn numbers(t: &Tracking) -> Numbers {
             t.delay_interval_s,
             t.residual_coherence,
             t.goodness,
+            t.target_noise,
             words(t.reason.as_ref()),
         ),
     )

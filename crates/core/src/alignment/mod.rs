@@ -387,7 +387,8 @@ impl Alignment {
             self.judge(state, view, start, expected)?
         };
         let share = high * followed;
-        Ok(if share > FAST_SHARE && self.in_time && found.reason.is_none() {
+        let without_cause = matches!(found.reason, None | Some(Reason::ResidualFollowsTarget { .. }));
+        Ok(if share > FAST_SHARE && self.in_time && without_cause {
             found.without_interval(Reason::TooFast { share })
         } else {
             found
