@@ -26,7 +26,7 @@ WINDOW, HOP = 2048, 512
 START = 2 * HOP
 
 
-def record(coefficient: float, delay_s: float = DELAY_S) -> tuple[np.ndarray, np.ndarray]:
+def record(coefficient: float, delay_s: float = DELAY_S, seed: int = 5) -> tuple[np.ndarray, np.ndarray]:
     """A drifting burst and its late copy with noise of 2 %, white or coloured."""
     t = np.arange(WINDOW + 4 * HOP) / RATE_HZ
 
@@ -34,7 +34,7 @@ def record(coefficient: float, delay_s: float = DELAY_S) -> tuple[np.ndarray, np
         burst = np.exp(-(((t - 1.9) / 0.8) ** 2)) * np.sin(2 * np.pi * 2.3 * t)
         return np.asarray(burst + 0.4 * np.tanh(2 * (t - 2.1)) + 0.1 * np.sin(2 * np.pi * 6.1 * t + 1))
 
-    white = np.random.default_rng(5).standard_normal(t.size)
+    white = np.random.default_rng(seed).standard_normal(t.size)
     noise = np.zeros(t.size)
     for i in range(1, t.size):
         noise[i] = coefficient * noise[i - 1] + np.sqrt(1 - coefficient**2) * white[i]
@@ -97,11 +97,16 @@ def test_noise_on_both_signals_is_shared_out_as_the_twin_does() -> None:
 
 
 def test_whitening_is_worth_its_while_in_short_windows_of_strongly_coloured_noise() -> None:
-    target, measured = record(0.9)
-    white = judged(target, measured, estimator="least_squares")
-    coloured = judged(target, measured, estimator="least_squares", noise="coloured")
-    assert abs(coloured["delay_s"] - DELAY_S) < 4 * coloured["delay_std_s"]
-    assert coloured["delay_std_s"] < 1.05 * white["delay_std_s"]
+    stds = []
+    for seed in range(16):
+        target, measured = record(0.9, seed=seed)
+        white = judged(target, measured, estimator="least_squares")
+        coloured = judged(target, measured, estimator="least_squares", noise="coloured")
+        assert abs(coloured["delay_s"] - DELAY_S) < 4 * coloured["delay_std_s"]
+        stds.append((white["delay_std_s"], coloured["delay_std_s"]))
+    # What is known of either from one window scatters by a tenth.
+    before, after = np.mean(stds, axis=0)
+    assert after < 1.05 * before
 
 
 def test_several_actuators_have_their_own_intervals_and_reasons() -> None:

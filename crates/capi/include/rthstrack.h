@@ -95,6 +95,8 @@ enum rthstrack_reason
     RTHSTRACK_REASON_OPPOSITE_SIGN = 10,
     // The iteration did not settle on a delay.
     RTHSTRACK_REASON_NO_CONVERGENCE = 11,
+    // The target is mostly noise of its own: the share `reason_values[0]` of it, or of its velocity.
+    RTHSTRACK_REASON_NOISY_TARGET = 12,
     // Another reason without numbers.
     RTHSTRACK_REASON_OTHER = 99,
     // No interval: the residual follows the target with coherence `reason_values[0]`.

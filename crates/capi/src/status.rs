@@ -87,6 +87,8 @@ pub enum rthstrack_reason {
     RTHSTRACK_REASON_OPPOSITE_SIGN = 10,
     /// The iteration did not settle on a delay.
     RTHSTRACK_REASON_NO_CONVERGENCE = 11,
+    /// The target is mostly noise of its own: the share `reason_values[0]` of it, or of its velocity.
+    RTHSTRACK_REASON_NOISY_TARGET = 12,
     /// Another reason without numbers.
     RTHSTRACK_REASON_OTHER = 99,
     /// No interval: the residual follows the target with coherence `reason_values[0]`.
@@ -103,7 +105,7 @@ pub enum rthstrack_reason {
 use rthstrack_reason as Code;
 
 impl Code {
-    const ALL: [Code; 17] = [
+    const ALL: [Code; 18] = [
         Code::RTHSTRACK_REASON_NONE,
         Code::RTHSTRACK_REASON_STILL,
         Code::RTHSTRACK_REASON_NOT_FINITE,
@@ -116,6 +118,7 @@ impl Code {
         Code::RTHSTRACK_REASON_BEYOND_MAX_DELAY,
         Code::RTHSTRACK_REASON_OPPOSITE_SIGN,
         Code::RTHSTRACK_REASON_NO_CONVERGENCE,
+        Code::RTHSTRACK_REASON_NOISY_TARGET,
         Code::RTHSTRACK_REASON_OTHER,
         Code::RTHSTRACK_REASON_RESIDUAL_FOLLOWS_TARGET,
         Code::RTHSTRACK_REASON_FEW_BINS,
@@ -140,6 +143,7 @@ impl Code {
             Some(Reason::BeyondMaxDelay { max_delay_s }) => with(Code::RTHSTRACK_REASON_BEYOND_MAX_DELAY, max_delay_s),
             Some(Reason::OppositeSign) => plain(Code::RTHSTRACK_REASON_OPPOSITE_SIGN),
             Some(Reason::NoConvergence) => plain(Code::RTHSTRACK_REASON_NO_CONVERGENCE),
+            Some(Reason::NoisyTarget { share }) => with(Code::RTHSTRACK_REASON_NOISY_TARGET, share),
             Some(Reason::ResidualFollowsTarget { coherence }) => {
                 with(Code::RTHSTRACK_REASON_RESIDUAL_FOLLOWS_TARGET, coherence)
             }
@@ -178,13 +182,16 @@ impl Code {
                   (expected_delay_s)"
             }
             Code::RTHSTRACK_REASON_BEYOND_MAX_DELAY => {
-                c"not determined: the delay seems to lie beyond what is searched, max_delay_s or a quarter of the \
-                  window; raise max_delay_s or take a longer window"
+                c"not determined: the delay seems to lie beyond max_delay_s, or beyond a quarter of the window; raise it or \
+                  take a longer window"
             }
             Code::RTHSTRACK_REASON_OPPOSITE_SIGN => {
                 c"not determined: measured moves against target; does one of them have the opposite sign?"
             }
             Code::RTHSTRACK_REASON_NO_CONVERGENCE => c"not determined: the iteration did not settle on a delay",
+            Code::RTHSTRACK_REASON_NOISY_TARGET => {
+                c"not determined: target is mostly noise of its own; take a longer window or a band with less noise"
+            }
             Code::RTHSTRACK_REASON_OTHER => c"not determined",
             Code::RTHSTRACK_REASON_RESIDUAL_FOLLOWS_TARGET => {
                 c"no interval: what one gain and one delay leave still follows target, so they are not constant over \
@@ -235,6 +242,7 @@ mod tests {
             Reason::BeyondMaxDelay { max_delay_s: 0.25 },
             Reason::OppositeSign,
             Reason::NoConvergence,
+            Reason::NoisyTarget { share: 0.5 },
             Reason::ResidualFollowsTarget { coherence: 0.5 },
             Reason::FewBins,
             Reason::WeightPower,

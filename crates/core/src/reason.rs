@@ -48,6 +48,11 @@ pub enum Reason {
     OppositeSign,
     /// The iteration did not settle.
     NoConvergence,
+    /// What the target holds is mostly noise of its own.
+    NoisyTarget {
+        /// Share of noise in the energy of its displacement or velocity, whichever is larger.
+        share: f64,
+    },
     /// No interval: the residual follows the target, so that gain and delay are not one number each.
     ResidualFollowsTarget {
         /// Coherence of residual and target.
@@ -116,14 +121,20 @@ impl fmt::Display for Reason {
             Reason::BeyondMaxDelay { max_delay_s } => {
                 write!(
                     f,
-                    "not determined: the delay seems to lie beyond the {max_delay_s} s that are searched, max_delay_s or a quarter of \
-                 the samples; raise max_delay_s or take a longer window"
+                    "not determined: the delay seems to lie beyond max_delay_s, or beyond a quarter of the samples ({max_delay_s} s \
+                 are searched); raise it or take a longer window"
                 )
             }
             Reason::OppositeSign => {
                 write!(f, "not determined: measured moves against target; does one of them have the opposite sign?")
             }
             Reason::NoConvergence => write!(f, "not determined: the iteration did not settle on a delay"),
+            Reason::NoisyTarget { share } => write!(
+                f,
+                "not determined: target is mostly noise of its own ({:.0} % of it or of its velocity); take a longer window or \
+                 a band with less noise",
+                100.0 * share
+            ),
             Reason::ResidualFollowsTarget { coherence } => write!(
                 f,
                 "no interval: what one gain and one delay leave still follows target (coherence {coherence:.2}), so they \

@@ -66,6 +66,8 @@ const UNSTEADY: f64 = 1.5;
 const CLEAR_ODDS: f64 = 1e3 * LOG_ODDS;
 /// The bias of noise on the target may be this share of the standard deviation.
 const NOISY_SHARE: f64 = 0.05;
+/// Of noise alone that share of the target's energy, or of its velocity's, may be; what is left of more is no measure.
+const MOSTLY_NOISE: f64 = 0.5;
 /// At a lower rate this share of the target's velocity may be lost, as energy.
 const SLOW_SHARE: f64 = 0.01;
 /// Octaves in which its velocity is looked at.
@@ -191,6 +193,8 @@ struct Fit {
     /// The same less what noise on the target adds, and that noise's energy.
     clean: Products,
     noise: f64,
+    /// Its share of the energy of displacement or velocity, whichever is larger.
+    noise_share: f64,
     residual: f64,
     /// The share of measured that is explained, where the signals in the state do not tell.
     goodness: Option<f64>,
@@ -520,6 +524,9 @@ impl Alignment {
         mut best: Fit,
         mut support: Range<usize>,
     ) -> std::result::Result<Tracking, Reason> {
+        if self.noise_ratio == 0.0 && best.noise_share > MOSTLY_NOISE {
+            return Err(Reason::NoisyTarget { share: best.noise_share.min(1.0) });
+        }
         if self.estimator == Estimator::Aligned {
             let tracking = self.align(state, view, start, support, best)?;
             self.check_delay(tracking.delay_s * self.rate_hz, peaks)?;
@@ -845,6 +852,7 @@ impl Alignment {
                     products,
                     clean: score.clean,
                     noise: score.own,
+                    noise_share: score.share,
                     residual: (oo - 2.0 * gain * along + gain * gain * energy).max(0.0),
                     goodness: None,
                 });
@@ -1289,6 +1297,8 @@ struct Score {
     clean: Products,
     /// The energy of the target's own noise in yy.
     own: f64,
+    /// Its share of yy or vv, whichever is larger.
+    share: f64,
 }
 
 /// The derivative of the objective with respect to the delay, up to a positive factor, at `tau` and the best gain.
@@ -1323,7 +1333,7 @@ fn score(p: &Products, tau: f64, target_noise: &TargetNoise<'_>) -> Option<Score
             (gain, residual.max(0.0) / (lambda + gain * gain * g), Some((correlation, taps)))
         }
     };
-    let mut own = 0.0;
+    let (mut own, mut share) = (0.0, 0.0);
     if let Some((correlation, taps)) = known
         && noise > 0.0
     {
@@ -1332,6 +1342,7 @@ fn score(p: &Products, tau: f64, target_noise: &TargetNoise<'_>) -> Option<Score
         // Interpolated noise is smaller between samples than on them; the objective does not reward that.
         clean.yv -= noise * correlate(correlation, &taps.value, &taps.slope);
         clean.vv -= noise * correlate(correlation, &taps.slope, &taps.slope);
+        share = 1.0 - (clean.yy / p.yy).min(clean.vv / p.vv);
         if clean.vv * clean.yy <= clean.yv * clean.yv {
             clean.vv = p.vv;
         }
@@ -1340,7 +1351,7 @@ fn score(p: &Products, tau: f64, target_noise: &TargetNoise<'_>) -> Option<Score
     let value = gain * clean.yv - p.ov;
     let slope = gain * (clean.vv - clean.yv * clean.yv / clean.yy);
     let usable = gain > 0.0 && slope > 0.0 && slope.is_finite() && value.is_finite();
-    usable.then_some(Score { value, slope, gain, clean, own })
+    usable.then_some(Score { value, slope, gain, clean, own, share })
 }
 
 /// The bins that a configuration keeps. What it does to the samples is done here, over those that are judged.
