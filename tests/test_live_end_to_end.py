@@ -179,8 +179,8 @@ def beside_the_batch(
             )
             expected = {"amplitude": moving.amplitude[-1], "delay_s": moving.delay_s[-1]}
         n += 1
-        # A window of a longer record is told which of two peaks is near, so its search starts elsewhere: the last step, up to
-        # 2e-3 of a sample, leaves less than its square.
+        # A window of a longer record is told which of two peaks is near, so its search starts elsewhere: the last step,
+        # up to 2e-3 of a sample, leaves less than its square.
         left = {"amplitude": 1e-9, "delay_s": 1e-6 * P / RATE_HZ}
         for name, value in expected.items():
             assert found[k][name] == pytest.approx(value, rel=1e-9, abs=left[name])

@@ -194,7 +194,8 @@ class Tracking(_Result):
     the spectrum of what the fit leaves; `residual_coherence`: how far that still follows the target, 0 to 1;
     `goodness`: the share of measured that one gain and one delay explain. All are NaN for "fei", and where not
     determined. `target_noise_std`: standard deviation of the noise that is the target's own, in its unit, where it was
-    taken into account, else 0. `reason` says why there is no number, or no interval, and is empty where nothing is missing.
+    taken into account, else 0. `reason` says why there is no number, or no interval, and is empty where nothing is
+    missing.
     With `weights=True` also, per kept bin (n_bins,) or (n_bins, n_actuators): `frequency_hz` (n_bins,), `weights`
     (sum to one), `target_spectrum` and `measured_spectrum` (complex DFT of the windowed, zero-padded signals).
     """
