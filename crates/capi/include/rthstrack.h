@@ -108,6 +108,9 @@ enum rthstrack_reason
     // No interval: the share `reason_values[0]` of the target's motion lies above a third of the rate, too fast to be read
     // between samples.
     RTHSTRACK_REASON_TOO_FAST = 103,
+    // No interval: the noise is coloured, and how much of it is the target's own, up to the share `reason_values[0]` of its
+    // velocity, is not known.
+    RTHSTRACK_REASON_COLOURED_TARGET_NOISE = 104,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L

@@ -100,12 +100,15 @@ pub enum rthstrack_reason {
     /// No interval: the share `reason_values[0]` of the target's motion lies above a third of the rate, too fast to be read
     /// between samples.
     RTHSTRACK_REASON_TOO_FAST = 103,
+    /// No interval: the noise is coloured, and how much of it is the target's own, up to the share `reason_values[0]` of its
+    /// velocity, is not known.
+    RTHSTRACK_REASON_COLOURED_TARGET_NOISE = 104,
 }
 
 use rthstrack_reason as Code;
 
 impl Code {
-    const ALL: [Code; 18] = [
+    const ALL: [Code; 19] = [
         Code::RTHSTRACK_REASON_NONE,
         Code::RTHSTRACK_REASON_STILL,
         Code::RTHSTRACK_REASON_NOT_FINITE,
@@ -124,6 +127,7 @@ impl Code {
         Code::RTHSTRACK_REASON_FEW_BINS,
         Code::RTHSTRACK_REASON_WEIGHT_POWER,
         Code::RTHSTRACK_REASON_TOO_FAST,
+        Code::RTHSTRACK_REASON_COLOURED_TARGET_NOISE,
     ];
 
     /// The code, and what the reason says in numbers; NaN where it says none.
@@ -150,6 +154,7 @@ impl Code {
             Some(Reason::FewBins) => plain(Code::RTHSTRACK_REASON_FEW_BINS),
             Some(Reason::WeightPower) => plain(Code::RTHSTRACK_REASON_WEIGHT_POWER),
             Some(Reason::TooFast { share }) => with(Code::RTHSTRACK_REASON_TOO_FAST, share),
+            Some(Reason::ColouredTargetNoise { share }) => with(Code::RTHSTRACK_REASON_COLOURED_TARGET_NOISE, share),
             Some(_) => plain(Code::RTHSTRACK_REASON_OTHER),
         }
     }
@@ -202,6 +207,10 @@ impl Code {
             Code::RTHSTRACK_REASON_TOO_FAST => {
                 c"no interval: target moves too fast to be read between samples; sample faster"
             }
+            Code::RTHSTRACK_REASON_COLOURED_TARGET_NOISE => {
+                c"no interval: the noise is coloured, so how much of it is target's own is not known; take a band with less \
+                  noise"
+            }
         }
     }
 }
@@ -247,6 +256,7 @@ mod tests {
             Reason::FewBins,
             Reason::WeightPower,
             Reason::TooFast { share: 0.5 },
+            Reason::ColouredTargetNoise { share: 0.5 },
         ];
         for reason in reasons {
             let (code, _) = Code::of(Some(reason));

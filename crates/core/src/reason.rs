@@ -63,6 +63,11 @@ pub enum Reason {
         /// Share of the target's energy that lies above about 0.35 of the rate.
         share: f64,
     },
+    /// No interval: the noise is coloured, and how much of it is the target's own is not known.
+    ColouredTargetNoise {
+        /// Share of the energy of the target, or of its velocity, that may be noise.
+        share: f64,
+    },
     /// No interval: too few frequency bins to know the noise by.
     FewBins,
     /// No interval: it is known for weight power 2 only.
@@ -74,7 +79,11 @@ impl Reason {
     pub fn is_undetermined(&self) -> bool {
         !matches!(
             self,
-            Reason::ResidualFollowsTarget { .. } | Reason::TooFast { .. } | Reason::FewBins | Reason::WeightPower
+            Reason::ResidualFollowsTarget { .. }
+                | Reason::TooFast { .. }
+                | Reason::ColouredTargetNoise { .. }
+                | Reason::FewBins
+                | Reason::WeightPower
         )
     }
 }
@@ -144,6 +153,12 @@ impl fmt::Display for Reason {
                 f,
                 "no interval: {:.2} % of target's motion is too fast to be read between samples, above a third of their \
                  rate; sample faster",
+                100.0 * share
+            ),
+            Reason::ColouredTargetNoise { share } => write!(
+                f,
+                "no interval: the noise is coloured, so how much of it is target's own is not known (up to {:.0} % of its \
+                 velocity); take a band with less noise",
                 100.0 * share
             ),
             Reason::FewBins => write!(f, "no interval: too few frequency bins to know the noise by"),

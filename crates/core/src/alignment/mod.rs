@@ -68,6 +68,9 @@ const CLEAR_ODDS: f64 = 1e3 * LOG_ODDS;
 const NOISY_SHARE: f64 = 0.05;
 /// Of noise alone that share of the target's energy, or of its velocity's, may be; what is left of more is no measure.
 const MOSTLY_NOISE: f64 = 0.5;
+/// A residual of so many times what white noise leaves is coloured, and this share of a target may then be noise.
+const COLOURED: f64 = 2.0;
+const UNKNOWN_NOISE: f64 = 0.2;
 /// At a lower rate this share of the target's velocity may be lost, as energy.
 const SLOW_SHARE: f64 = 0.01;
 /// Octaves in which its velocity is looked at.
@@ -162,8 +165,10 @@ pub(crate) struct AlignmentState {
     /// The best fit's residual, likewise, to compare others with.
     whitened_residual: Vec<f64>,
     weighting: Weighting,
-    /// Variance of the noise that is the target's own, a sample; 0 where it is taken for exact.
+    /// Variance of the noise that is the target's own, a sample; 0 where it is taken for exact. And of measured's, by its highest
+    /// frequencies, where the target's is not 0.
     target_noise: f64,
+    measured_noise: f64,
     /// Target and measured, decimated, and the buffers of each level.
     decimated: [Vec<f64>; 2],
     levels: Vec<AlignmentState>,
@@ -336,6 +341,7 @@ impl Alignment {
                 correlation: [0.0; NODES],
             },
             target_noise: 0.0,
+            measured_noise: 0.0,
             decimated: std::array::from_fn(|_| {
                 vec![0.0; self.levels.iter().map(|l| l.alignment.longest_view()).max().unwrap_or(0)]
             }),
@@ -377,6 +383,7 @@ impl Alignment {
         if !(high > FAST_SHARE || motion.is_noisy()) {
             return self.judge(state, view, start, expected);
         }
+        state.measured_noise = floor::variance(measured, 1) / floor::of_correlated(&self.correlation);
         let found = self.judge_noisy(state, view, start, expected, &motion)?;
         let followed = floor::followed(target, measured, found.delay_s * self.rate_hz, found.amplitude);
         if followed == 0.0 {
@@ -449,7 +456,9 @@ impl Alignment {
         decimator.block(&view.target[from..], &mut target[..n]);
         decimator.block(&view.measured[from..], &mut measured[..n]);
         let view = View { target: &target[..n], measured: &measured[..n], origin: (first + margin) as usize };
+        let measured_noise = state.measured_noise * variance;
         let lower = &mut state.levels[level];
+        lower.measured_noise = measured_noise;
         lower.target_noise = noise * variance;
         let found = alignment.judge(lower, &view, margin as usize, expected.map(|d| d / factor as f64));
         state.decimated = [target, measured];
@@ -542,7 +551,29 @@ impl Alignment {
             best = Fit { goodness, ..self.refine(state, view, start, &support, best.tau, room, true)? };
         }
         self.check_delay(best.tau, peaks)?;
-        Ok(self.finish(state, start, &support, &best, None))
+        let tracking = self.finish(state, start, &support, &best, None);
+        let share = self.most_target_noise(state, start, &support, &best);
+        Ok(if share > UNKNOWN_NOISE && tracking.reason.is_none() {
+            tracking.without_interval(Reason::ColouredTargetNoise { share })
+        } else {
+            tracking
+        })
+    }
+
+    /// The share of the target's energy, or of its velocity's, that is noise if all is that the residual shows: asked where it
+    /// shows more than both channels' highest frequencies do, so that the noise is coloured. Else 0.
+    fn most_target_noise(&self, state: &AlignmentState, start: usize, support: &Range<usize>, fit: &Fit) -> f64 {
+        if !(self.in_time && fit.noise > 0.0) {
+            return 0.0;
+        }
+        let within = support.start - start..support.end - start;
+        let gain = fit.gain * fit.gain;
+        let white = (state.measured_noise + gain * state.target_noise) * self.window_moments(&within).0;
+        if fit.residual > COLOURED * white {
+            (fit.noise_share * fit.residual / (gain * fit.noise)).min(1.0)
+        } else {
+            0.0
+        }
     }
 
     /// The largest delay taken, in samples.
