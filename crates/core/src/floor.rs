@@ -24,6 +24,8 @@ const LEAST_COMPARED: usize = 1 << 11;
 const MOST_COMPARED: usize = 1 << 14;
 const LAGS: usize = 4;
 const STRIP: usize = 128;
+/// Places between no lag and the lag at which they are compared at most.
+const MOST_PLACES: usize = 16;
 /// Two channels' differences are alike from this correlation on, and this many standard deviations of chance.
 const ALIKE: f64 = 0.15;
 const CLEAR: f64 = 5.0;
@@ -89,8 +91,14 @@ pub(crate) fn of_correlated(correlation: &[f64]) -> f64 {
 }
 
 /// The share of the target's differences that measured follows at about `lag` samples and a gain: motion, not noise.
-/// `target` and `measured` are the same stretch.
+/// `target` and `measured` are the same stretch. An actuator may answer the highest frequencies sooner than the rest, so lags
+/// between none and that are looked at, too.
 pub(crate) fn followed(target: &[f64], measured: &[f64], lag: f64, gain: f64) -> f64 {
+    let between = (0..lag.abs() as usize).step_by(LAGS).take(MOST_PLACES).map(|l| (l as f64).copysign(lag));
+    std::iter::once(lag).chain(between).map(|lag| followed_at(target, measured, lag, gain)).fold(0.0, f64::max)
+}
+
+fn followed_at(target: &[f64], measured: &[f64], lag: f64, gain: f64) -> f64 {
     let n = target.len().min((target.len() / 2).clamp(LEAST_COMPARED, MOST_COMPARED));
     let base = lag.floor() as isize - 1;
     let margin = base.unsigned_abs() + LAGS;
@@ -102,7 +110,12 @@ pub(crate) fn followed(target: &[f64], measured: &[f64], lag: f64, gain: f64) ->
     let Followed { own, other, products } = Arch::new().dispatch(Follow { target, measured, base, from, to });
     let most = products.iter().fold(0.0, |m: f64, p| m.max(p.abs()));
     let chance = CLEAR / (INDEPENDENT * (to - from) as f64).sqrt();
-    if most > (own * other).sqrt() * ALIKE.max(chance) { (BETWEEN * most / (gain * own)).min(1.0) } else { 0.0 }
+    let correlation = most / (own * other).sqrt();
+    if correlation.is_nan() || correlation <= ALIKE.max(chance) {
+        return 0.0;
+    }
+    // By measured's gain at these frequencies, which may be lower than elsewhere; the squared correlation needs none.
+    (BETWEEN * most / (gain * own)).max((BETWEEN * correlation).powi(2)).min(1.0)
 }
 
 /// Energies of the differences of both, and sums of products at each lag.

@@ -60,7 +60,13 @@ fn evaluating_allocates_nothing() {
         assert_eq!(COUNT.with(Cell::get), before, "{config:?}");
     }
     // A tone with many turns within reach, and a target with noise of its own.
-    let rough = |i: i32, k: i32| f64::from((i * k) % 1009 - 504) / 504.0;
+    // The finaliser of SplitMix64, for numbers that are as good as white.
+    let rough = |i: u64, k: u64| {
+        let mut z = (i + k).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    };
     let tone = |t: f64| t.min(1.0) * (125.0 * t).sin();
     let (high, late): (Vec<f64>, Vec<f64>) =
         (0..20_000).map(|i| f64::from(i) / 1000.0).map(|t| (tone(t), tone(t - 0.012))).unzip();

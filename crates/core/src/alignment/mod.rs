@@ -384,21 +384,28 @@ impl Alignment {
             return self.judge(state, view, start, expected);
         }
         state.measured_noise = floor::variance(measured, 1) / floor::of_correlated(&self.correlation);
-        let found = self.judge_noisy(state, view, start, expected, &motion)?;
-        let followed = floor::followed(target, measured, found.delay_s * self.rate_hz, found.amplitude);
+        let noisy = self.judge_noisy(state, view, start, expected, &motion);
+        state.target_noise = 0.0;
+        // Where noise leaves no number, what the target would give were it exact tells where to look.
+        let Ok(about) = noisy.or_else(|_| self.judge(state, view, start, expected)) else { return noisy };
+        let followed = floor::followed(target, measured, about.delay_s * self.rate_hz, about.amplitude);
         if followed == 0.0 {
-            return Ok(found);
+            return noisy;
         }
         // The highest frequencies are motion, as measured follows them; only what it does not follow is noise.
         let motion = Motion { noise: motion.noise * (1.0 - followed), ..motion };
-        state.target_noise = 0.0;
         let found = if motion.is_noisy() {
             self.judge_noisy(state, view, start, expected, &motion)?
         } else {
             self.judge(state, view, start, expected)?
         };
         let share = high * followed;
-        let without_cause = matches!(found.reason, None | Some(Reason::ResidualFollowsTarget { .. }));
+        // What is misread between samples follows the target as well; more than that has another cause.
+        let without_cause = match found.reason {
+            None => true,
+            Some(Reason::ResidualFollowsTarget { .. }) => 1.0 - found.goodness < 2.0 * share,
+            _ => false,
+        };
         Ok(if share > FAST_SHARE && self.in_time && without_cause {
             found.without_interval(Reason::TooFast { share })
         } else {
