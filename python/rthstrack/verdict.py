@@ -678,7 +678,7 @@ def _levels(target: NDArray[np.float64], name: str) -> str | None:
 def _quiet(moving: MovingTracking | None, name: str) -> str | None:
     if moving is None or moving.valid.size == 0:
         return None
-    share = 1 - float(moving.valid.mean())
+    share = float(np.mean(["too little motion" in str(why) for why in moving.reason]))
     if share < 0.5:
         return None
     return (
