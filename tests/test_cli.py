@@ -21,7 +21,9 @@ KEYS = {
     "amplitude_interval", "delay_std_s", "delay_interval_s", "residual_coherence", "goodness", "reason", "trusted",
     "slopes", "argument",
 }  # fmt: skip
-TRUSTED = {"estimator", "amplitude", "amplitude_interval", "delay_s", "delay_interval_s", "reason"}
+TRUSTED = {
+    "estimator", "amplitude", "amplitude_interval", "delay_s", "delay_interval_s", "target_noise_std", "reason",
+}  # fmt: skip
 INDICES = {
     "max_tracking_error", "max_tracking_error_percent", "rms_error", "rms_error_percent", "tracking_indicator", "j1_s",
     "j2_percent", "j3_percent",

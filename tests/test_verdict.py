@@ -108,3 +108,60 @@ def test_limits_are_told_only_where_exceeded() -> None:
 def test_a_quantised_peak_is_not_taken_for_clipping() -> None:
     slow = np.round(response(0.01, f_hz=0.3) / 0.01) * 0.01
     assert "clipped" not in warned(response(f_hz=0.3), slow)
+
+
+def test_a_coarsely_quantised_peak_is_not_taken_for_clipping_and_a_clipped_one_is() -> None:
+    peak = np.round(response(0.01, f_hz=0.3) / 0.1) * 0.1
+    assert "clipped" not in warned(response(f_hz=0.3), peak)
+    assert "clipped" in warned(response(f_hz=0.3), np.clip(peak, -7, 7))
+
+
+def noisy(x: np.ndarray, share: float, seed: int) -> np.ndarray:
+    return x + share * x.std() * np.random.default_rng(seed).standard_normal(x.size)
+
+
+def test_noise_on_the_target_is_told_with_its_level_and_taken_for_the_cause() -> None:
+    assessment = rthstrack.assess(noisy(response(), 0.03, 1), noisy(0.95 * response(0.0123), 0.03, 2), RATE)
+    (told,) = assessment.warnings
+    assert "target holds noise of its own, 3 % of its standard deviation" in told
+    assert assessment.trusted.target_noise_std == pytest.approx(0.03 * response().std(), rel=0.05)
+    assert "use the trusted estimate" in assessment.argument
+    assert "noise" in assessment.argument
+    assert "mean" not in assessment.argument
+
+
+@pytest.mark.parametrize("levels", [None, 2**16, 2**24])
+def test_a_target_as_a_good_converter_writes_it_is_not_called_noisy(levels: int | None) -> None:
+    def written(x: np.ndarray) -> np.ndarray:
+        return x if levels is None else np.round(x * levels / 40) * 40 / levels
+
+    assert "noise" not in warned(written(response()), written(0.95 * response(0.0123)))
+
+
+def test_each_number_is_told_its_own_cause() -> None:
+    """Noise on the target makes the published delay too short; phases that spread make its amplitude too small."""
+    f = np.fft.rfftfreq(N, 1 / RATE)
+    rng = np.random.default_rng(3)
+    spectrum = np.where((f > 0.5) & (f < 10), np.exp(2j * np.pi * rng.random(f.size)), 0)
+    target = np.fft.irfft(spectrum, N)
+    late = np.fft.irfft(spectrum * np.exp(-2j * np.pi * f * 0.0123), N)
+    argument = rthstrack.assess(noisy(target, 0.03, 4), noisy(late, 0.03, 5), RATE).argument
+    assert " ms below, as noise above " in argument
+    assert "% below in amplitude, as it averages phases that spread" in argument
+
+
+@pytest.mark.parametrize(("delay_s", "advice"), [(0.4, "try --max-delay 0.5"), (-0.3, "try --max-delay 0.5")])
+def test_a_delay_out_of_reach_is_called_so_with_an_advice_that_works(delay_s: float, advice: str) -> None:
+    target, measured = response(f_hz=2.5) + response(f_hz=0.9), response(delay_s, 2.5) + response(delay_s, 0.9)
+    said = rthstrack.assess(target, measured, RATE).argument
+    assert f"the delay seems to lie beyond max_delay_s, 0.25 s: {advice}" in said
+    found = rthstrack.assess(target, measured, RATE, settings=rthstrack.Settings(max_delay_s=0.5)).trusted
+    assert found.delay_s == pytest.approx(delay_s, abs=1e-5)
+
+
+def test_an_inverted_sensor_is_no_delay_that_varies() -> None:
+    target, measured = response(f_hz=2.5) + response(f_hz=0.9), -response(0.06, 2.5) - response(0.06, 0.9)
+    said = warned(target, measured)
+    assert "measured moves against target" in said
+    assert "--scale" in said
+    assert "not one number" not in said

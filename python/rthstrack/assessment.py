@@ -400,6 +400,7 @@ def _trusted_entry(t: Tracking) -> dict[str, Any]:
         "amplitude_interval": _ends(t.amplitude_interval),
         "delay_s": t.delay_s,
         "delay_interval_s": _ends(t.delay_interval_s),
+        "target_noise_std": t.target_noise_std,
         "reason": words.reason(t),
     }
 

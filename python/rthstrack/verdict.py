@@ -35,6 +35,12 @@ _LOW_COHERENCE = 0.9
 _FEW_LEVELS = 64
 # Clipped: so many samples in a row at an extreme so far from the mean, reached at a good part of the highest speed.
 _CLIPPED_RUN, _CLIPPED_STD, _CLIPPED_SPEED = 5, 1.5, 0.2
+# A quantised peak lasts as long as it takes the motion to change by a few steps of the converter.
+_CLIPPED_LEVELS = 10
+# A target with less noise than this share of its deviation, and less than would draw a fit by a microsecond, is clean.
+_TARGET_NOISE = 5e-4
+# Between samples the interpolated noise draws a fit by up to this share of its energy over that of a step.
+_PULL = 0.25
 _ODD_AMPLITUDE = 3.0
 # Spread of the delay over the frequencies that carry the weight, as a share of the delay.
 _DELAY_SPREAD = 0.2
@@ -45,12 +51,17 @@ _SAME_DELAY, _SAME_DELAY_S = 1e-3, 1e-6
 _NOTABLE = 1e-2
 # An interval that reaches further than this share of the delay to either side says little of it.
 _WIDE_INTERVAL = 0.1
-# A change of one setting is the cause of a difference when it leaves less than this share of it.
-_EXPLAINED = 0.5
+# A change of one setting is the cause of a difference when it leaves less than this share of it; what is computed from
+# the spectrum alone, without a trial, when it leaves less than that.
+_EXPLAINED, _FORETOLD = 0.5, 0.2
+# Of two causes in one, less than this share of the difference is not told.
+_MINOR = 0.25
+# A bin that holds so many times what noise leaves in it on average holds motion.
+_CLEAR_OF_NOISE = 16.0
 # A number that changes by more than this share over the frequencies of the energy is quoted with its slope only.
 _MISLEADING = 0.1
-# Phases that spread less than this average well.
-_WIDE_RAD = math.pi / 6
+# Ends this near to the mean, in standard deviations, are no cause.
+_AT_MEAN = 0.05
 # Over time: the middle eight tenths of the windows differ by this share, and by this many of their own half intervals.
 _UNSTEADY, _UNSTEADY_INTERVALS, _STEADY_WINDOWS = 0.1, 3.0, 4
 # Windows one length apart differ by this much less than if they had nothing to do with each other.
@@ -122,6 +133,7 @@ def _differences(tracking: Tracking, trusted: Tracking) -> list[str]:
 _ADVICE = {
     "too little motion to judge by": "; are these the right channels?",
     "the iteration did not settle on a delay": "; judge only the frequencies at which target moves (--band)",
+    "measured moves against target; does one of them have the opposite sign?": " (--scale CHANNEL=-1 turns one round)",
 }
 _NAMES = {
     "fei": "the published average",
@@ -145,7 +157,7 @@ def argument(
     """
     if (missing := _undetermined(trusted)) is not None:
         said = "no number can be trusted here" if _undetermined(tracking) is None else "there is no number to use"
-        return f"{said}: {missing}{_ADVICE.get(missing, '')}", None
+        return f"{said}: {_advised(missing, trusted)}", None
     if (missing := _undetermined(tracking)) is not None:
         asked_for = _NAMES[tracking.settings.estimator]
         return f"use the trusted estimate: {asked_for} is not determined: {missing}", None
@@ -165,9 +177,28 @@ def argument(
     which = _differences(tracking, trusted)
     if not which:
         return f"{ours} agrees with the trusted estimate {_how_well(tracking, trusted)}{slowly}", None
-    cause, text = _cause(target, tracking, trusted, which, slopes, variants, found)
-    gap = " and ".join(_gap(name, tracking, trusted) for name in which)
-    return f"use the trusted estimate: {ours} is {gap}, {text}{slowly}", cause
+    causes = [_cause(target, tracking, trusted, name, variants, found) for name in which]
+    if len({change for change, _, _ in causes}) == 1:
+        # One cause, told of the number that is off by most.
+        at = max(range(len(which)), key=lambda i: _relative(which[i], tracking, trusted))
+        gaps = [f"{' and '.join(_gap(name, tracking, trusted) for name in which)}, {causes[at][2]}"]
+    else:
+        gaps = [f"{_gap(name, tracking, trusted)}, {text}" for name, (_, _, text) in zip(which, causes, strict=True)]
+    # What follows the target is told by how gain and delay change.
+    without = f"; {trusted.reason}" if trusted.reason and "follows target" not in str(trusted.reason) else ""
+    told = next((warning for _, warning, _ in causes if warning is not None), None)
+    return f"use the trusted estimate: {ours} is {', and '.join(gaps)}{slowly}{without}", told
+
+
+def _advised(missing: str, trusted: Tracking) -> str:
+    """Why there is no number, with what to do about it in the command's words."""
+    settings, quarter_s = trusted.settings, trusted.n_samples / trusted.rate_hz / 4
+    if missing.startswith("the delay seems to lie beyond"):
+        if settings.max_delay_s < quarter_s:
+            most = min(2 * settings.max_delay_s, quarter_s)
+            return f"the delay seems to lie beyond max_delay_s, {settings.max_delay_s:g} s: try --max-delay {most:.3g}"
+        return f"the delay seems to lie beyond a quarter of the record, {quarter_s:.3g} s: a longer one is needed"
+    return missing + _ADVICE.get(missing, "")
 
 
 def _how_well(tracking: Tracking, trusted: Tracking) -> str:
@@ -295,72 +326,86 @@ def _unsteady(moving: MovingTracking | None) -> tuple[str, str] | None:
     return None
 
 
+def _relative(name: str, tracking: Tracking, trusted: Tracking) -> float:
+    """By how much a number is off, as a share of the trusted one."""
+    known = float(getattr(trusted, name))
+    return abs(float(getattr(tracking, name)) / known - 1) if known else math.inf
+
+
 def _cause(
     target: NDArray[np.float64],
     tracking: Tracking,
     trusted: Tracking,
-    which: list[str],
-    slopes: FrequencySlopes | None,
+    name: str,
     variants: Mapping[str, Tracking],
     found: Mapping[str, str],
-) -> tuple[str | None, str]:
-    """Why the estimate misses the trusted one: the name of the warning that it says, and the cause in words.
+) -> tuple[str | None, str | None, str]:
+    """Why one number misses the trusted one: what is to blame, the warning that says it, and the cause in words.
 
-    Each suspect is tried on the number that is off by most: what is left of the difference without it?
+    Each suspect is tried: what is left of the difference without it?
     """
-
-    def relative(name: str) -> float:
-        known = float(getattr(trusted, name))
-        return abs(float(getattr(tracking, name)) / known - 1) if known else math.inf
-
-    name = max(which, key=relative)
     ours, theirs = float(getattr(tracking, name)), float(getattr(trusted, name))
     readings = {change: float(getattr(variant, name)) for change, variant in variants.items()}
-    if (averaged := _phases_averaged(tracking, trusted)) is not None:
-        # What averaging makes of a constant delay is taken off.
-        readings["wrap"] = ours - averaged[name] + theirs
+    if (averaged := _averaged(target, tracking, trusted, name)) is not None:
+        # What averaging makes of a constant gain and delay, target's own noise and all, is taken off.
+        readings["average"] = ours - averaged[1] + theirs
     remains = {change: abs(reading - theirs) / abs(ours - theirs) for change, reading in readings.items()}
+    suspects = [change for change in ("detrend", "window", "band") if remains.get(change, 1.0) < _EXPLAINED]
+    if remains.get("average", 1.0) < _FORETOLD:
+        suspects.append("average")
     # Another average only tells that the difference is made before averaging, so it is the last to be asked.
-    suspects = [change for change in ("detrend", "window", "band", "wrap") if remains.get(change, 1.0) < _EXPLAINED]
     if not suspects and remains.get("estimator", 1.0) < _EXPLAINED:
         suspects = ["estimator"]
     if not suspects:
-        return None, "which neither drift, window, noise nor wide phases explain alone"
-    cause = min(suspects, key=remains.__getitem__)
-    if cause == "wrap":
-        low, high = (360 * abs(float(trusted.delay_s)) * edge for edge in _middle(tracking))
+        return None, None, "which neither drift, window, noise nor wide phases explain alone"
+    cause = "average" if "average" in suspects else min(suspects, key=remains.__getitem__)
+    by_noise = 0.0
+    if cause == "average" and averaged is not None:
+        clean, noisy = averaged
+        by_noise = (noisy - clean) / (noisy - theirs)
+        if by_noise > 1 - _MINOR and "band" in suspects:
+            cause = "band"  # the same, with a remedy
+    if cause == "average":
+        noise = "target's own noise counts as motion"
+        if by_noise > 1 - _MINOR:
+            return "target noise", None, f"as {noise}"
+        frequency, weights = _of_motion(target, tracking, trusted)
+        low, high = (360 * abs(float(trusted.delay_s)) * edge for edge in _middle(frequency, weights))
+        said = f"as it averages phases that spread from {_percent(low)} to {_percent(high)} degrees"
         if low > 180:
-            return None, f"as it takes phases of {low:.0f} to {high:.0f} degrees for less than half a turn"
-        return None, f"as it averages phases that spread from {low:.0f} to {high:.0f} degrees"
+            said = f"as it takes phases of {low:.0f} to {high:.0f} degrees for less than half a turn"
+        return cause, None, said if by_noise < _MINOR else f"{said}, and {noise}"
     window = tracking.settings.window
     scale, unit = (1e3, " ms") if name == "delay_s" else (1.0, "")
     reading = f"it reads {'d' if unit else 'A'} = {scale * readings[cause]:.4g}{unit}"
     if cause == "estimator":
         where = "its two ends act" if window == "boxcar" else f"the {window} window acts"
-        return None, f"as {where} on different points of both motions: with --estimator aligned {reading}"
+        return cause, None, f"as {where} on different points of both motions: with --estimator aligned {reading}"
     if cause == "band":
         low, high = variants["band"].settings.band_hz or (0.0, math.inf)
-        said = "noise" if "noise" in found else None
-        return said, f"as noise above {high:.3g} Hz counts as motion: with --band {low:g} {high:.3g} {reading}"
+        warning = "noise" if "noise" in found else None
+        return (
+            cause,
+            warning,
+            f"as noise above {high:.3g} Hz counts as motion: with --band {low:g} {high:.3g} {reading}",
+        )
     remedy = (
         f"--detrend {variants[cause].settings.detrend}"
         if cause == "detrend"
         else f"--window {variants[cause].settings.window}"
     )
     if cause == "window" and window != "boxcar":
-        return None, f"as the {window} window acts on different points of both motions: with {remedy} {reading}"
+        return cause, None, f"as the {window} window acts on different points of both motions: with {remedy} {reading}"
     if "drift" in found:
-        return "drift", f"as {found['drift'].partition(': try')[0]}: with {remedy} {reading}"
-    return None, f"as {_ends_apart(target)}: with {remedy} {reading}"
+        return cause, "drift", f"as {found['drift'].partition(': try')[0]}: with {remedy} {reading}"
+    return cause, None, f"as {_ends_apart(target)}: with {remedy} {reading}"
 
 
-def _middle(tracking: Tracking) -> tuple[float, float]:
+def _middle(frequency: NDArray[np.float64], weights: NDArray[np.float64]) -> tuple[float, float]:
     """The frequencies between which the middle nine tenths of the weight lie."""
-    assert tracking.frequency_hz is not None
-    assert tracking.weights is not None
-    share = np.cumsum(tracking.weights)
-    first, last = np.searchsorted(share, (0.05, 0.95)).clip(max=share.size - 1)
-    return float(tracking.frequency_hz[first]), float(tracking.frequency_hz[last])
+    share = np.cumsum(weights)
+    first, last = np.searchsorted(share, (0.05 * share[-1], 0.95 * share[-1])).clip(max=share.size - 1)
+    return float(frequency[first]), float(frequency[last])
 
 
 def _ends_apart(target: NDArray[np.float64]) -> str:
@@ -368,26 +413,44 @@ def _ends_apart(target: NDArray[np.float64]) -> str:
     n = max(1, target.size // 50)
     mean, spread = float(target.mean()), float(target.std())
     first, last = (float(part.mean() - mean) / spread for part in (target[:n], target[-n:]))
+    if max(abs(first), abs(last)) < _AT_MEAN:
+        return "its two ends act on different points of both motions"
     return (
         f"target does not begin and end at its mean ({first:+.2g} and {last:+.2g} standard deviations), "
         "which acts on it and on measured at different points of the motion"
     )
 
 
-def _phases_averaged(tracking: Tracking, trusted: Tracking) -> dict[str, float] | None:
-    """What the published average makes of the trusted amplitude and delay, were they the same at every frequency."""
+def _of_motion(
+    target: NDArray[np.float64], tracking: Tracking, trusted: Tracking
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The bins' frequencies, and their weights less what the target's own noise, taken for white, adds to each."""
     frequency, weights = tracking.frequency_hz, tracking.weights
-    if tracking.settings.estimator != "fei" or frequency is None or weights is None:
+    assert frequency is not None
+    assert weights is not None
+    if not float(trusted.target_noise_std) > 0 or tracking.settings.weight_power != 2:
+        return frequency, weights
+    share = (float(trusted.target_noise_std) / float(target.std())) ** 2
+    noise = share * tracking.delta_f_hz / (tracking.rate_hz / 2)
+    return frequency, np.where(weights > _CLEAR_OF_NOISE * noise, weights - noise, 0.0)
+
+
+def _averaged(
+    target: NDArray[np.float64], tracking: Tracking, trusted: Tracking, name: str
+) -> tuple[float, float] | None:
+    """What the published average makes of the trusted number, were it the same at every frequency.
+
+    Without the target's own noise, and with it: it weighs bins that hold nothing else.
+    """
+    if tracking.settings.estimator != "fei":
         return None
-    low, high = (2 * math.pi * abs(float(trusted.delay_s)) * edge for edge in _middle(tracking))
-    if high - low < _WIDE_RAD and high < math.pi:
-        return None
-    mean = complex((weights * np.exp(-2j * np.pi * float(trusted.delay_s) * frequency)).sum())
-    f_eq = float(tracking.equivalent_frequency_hz)
-    return {
-        "amplitude": abs(mean) * float(trusted.amplitude),
-        "delay_s": -float(np.angle(mean)) / (2 * math.pi * f_eq),
-    }
+    frequency, motion = _of_motion(target, tracking, trusted)
+    turned = complex((motion * np.exp(-2j * np.pi * float(trusted.delay_s) * frequency)).sum())
+    if name == "amplitude":
+        noisy = abs(turned) * float(trusted.amplitude)
+        return noisy / float(motion.sum()), noisy
+    delay = -float(np.angle(turned)) / (2 * math.pi)
+    return delay * float(motion.sum() / (motion * frequency).sum()), delay / float(tracking.equivalent_frequency_hz)
 
 
 def _percent(value: float) -> str:
@@ -438,7 +501,7 @@ def warnings(
         "noise": _high_energy(tracking),
         "target noise": _target_noise(target, trusted, names),
         "coherence": _coherence(tracking, response, names),
-        "delay spread": _delay_spread(tracking, response),
+        "delay spread": _delay_spread(tracking, trusted, response),
         "levels": _levels(target, names[0]),
         "quiet": _quiet(moving, names[0]),
     }
@@ -515,14 +578,17 @@ def _high_energy(tracking: Tracking) -> str | None:
 
 
 def _target_noise(target: NDArray[np.float64], trusted: Tracking, names: tuple[str, str]) -> str | None:
-    """That the trusted estimate had to reckon with noise on the target."""
-    noise = float(trusted.target_noise_std)
-    if not noise > 0:
+    """That the trusted estimate had to reckon with noise on the target, where that is worth a word."""
+    noise, spread = float(trusted.target_noise_std), float(target.std())
+    # What is too fast to be read between samples cannot be told from noise.
+    if not noise > 0 or "too fast" in str(trusted.reason):
         return None
-    share = _percent(100 * noise / float(target.std()))
+    steps = max(float(np.mean(np.diff(target) ** 2)) - 2 * noise**2, 0.0)
+    if noise < _TARGET_NOISE * spread and _PULL * noise**2 < _SAME_DELAY_S * trusted.rate_hz * steps:
+        return None
     return (
-        f"{names[0]} holds noise of its own, {share} % of its standard deviation: the trusted estimate takes it into "
-        "account, the published average does not (--band leaves less of it)"
+        f"{names[0]} holds noise of its own, {_percent(100 * noise / spread)} % of its standard deviation: the trusted "
+        "estimate takes it into account, the published average does not (--band leaves less of it)"
     )
 
 
@@ -549,9 +615,10 @@ def _coherence(tracking: Tracking, response: FrequencyResponse | None, names: tu
     )
 
 
-def _delay_spread(tracking: Tracking, response: FrequencyResponse | None) -> str | None:
+def _delay_spread(tracking: Tracking, trusted: Tracking, response: FrequencyResponse | None) -> str | None:
     """Whether the delay at the frequencies that carry the middle nine tenths of the energy is one number."""
-    if response is None or tracking.frequency_hz is None:
+    # A sign or a turn that is not known makes any delay a curve.
+    if response is None or tracking.frequency_hz is None or _undetermined(trusted) is not None:
         return None
     weight = np.where(np.nan_to_num(response.coherence) >= _LOW_COHERENCE, _weighted(tracking, response), 0.0)
     share = np.cumsum(weight)
@@ -577,17 +644,24 @@ def _clipped(signal: NDArray[np.float64], name: str) -> str | None:
     steps = np.abs(np.diff(signal))
     if not steps.any():
         return None
-    fast = _CLIPPED_SPEED * float(steps.max())
+    fast, level = _CLIPPED_SPEED * float(steps.max()), float(steps[steps > 0].min())
     for extreme in (float(signal.max()), float(signal.min())):
         if abs(extreme - mean) < _CLIPPED_STD * spread:
             continue
         at = np.concatenate(([False], signal == extreme, [False]))
         edges = np.flatnonzero(np.diff(at.astype(np.int8)))
         starts, ends = edges[::2], edges[1::2]
-        hits = (ends - starts >= _CLIPPED_RUN) & (starts > 0) & (ends < signal.size)
+        lengths = ends - starts
+        hits = (lengths >= _CLIPPED_RUN) & (starts > 0) & (ends < signal.size)
         hits[hits] &= (steps[starts[hits] - 1] > fast) | (steps[ends[hits] - 1] > fast)
+        # As long before or after as it stays, a quantised peak has changed by a few levels only.
+        apart = np.maximum(
+            np.abs(signal[np.maximum(starts - lengths, 0)] - extreme),
+            np.abs(signal[np.minimum(ends - 1 + lengths, signal.size - 1)] - extreme),
+        )
+        hits &= apart > _CLIPPED_LEVELS * level
         if hits.any():
-            n_clipped = int((ends - starts)[hits].sum())
+            n_clipped = int(lengths[hits].sum())
             return f"{name} looks clipped: {n_clipped} samples stay exactly at its extreme {extreme:g}"
     return None
 
@@ -604,7 +678,7 @@ def _levels(target: NDArray[np.float64], name: str) -> str | None:
 def _quiet(moving: MovingTracking | None, name: str) -> str | None:
     if moving is None or moving.valid.size == 0:
         return None
-    share = 1 - float(moving.valid.mean())
+    share = float(np.mean(["too little motion" in str(why) for why in moving.reason]))
     if share < 0.5:
         return None
     return (
