@@ -9,7 +9,7 @@
 //! * The real sequence is transformed as half as many complex points, and unpacked while it is summed.
 
 use std::f64::consts::PI;
-use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::sync::Arc;
 
 use num_complex::Complex;
 use pulp::{Arch, NullaryFnOnce, Simd, WithSimd};
@@ -53,7 +53,7 @@ pub(crate) struct Spectrum {
     layout: Layout,
     window: Option<Vec<f64>>,
     cascade: Cascade,
-    transform: Arc<Transform>,
+    transform: Transform,
     arch: Arch,
 }
 
@@ -151,7 +151,7 @@ impl Spectrum {
         Self {
             layout,
             window: config.window.coefficients(config.n_samples),
-            transform: Transform::shared(cascade.out_len() / 2),
+            transform: Transform::new(cascade.out_len() / 2),
             cascade,
             arch: Arch::new(),
         }
@@ -423,24 +423,10 @@ struct Transform {
     unpack: Unpack,
 }
 
-/// Those in use. Windows, detrending and bands differ from plan to plan; the tables, which outweigh a signal, do not.
-static TRANSFORMS: Mutex<Vec<(usize, Weak<Transform>)>> = Mutex::new(Vec::new());
-
 impl Transform {
-    /// Of `half` complex points: that of another plan where there is one.
-    fn shared(half: usize) -> Arc<Self> {
-        // What is found is whole, whatever became of the thread that held the lock.
-        let lock = || TRANSFORMS.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = lock().iter().find(|(len, _)| *len == half).and_then(|(_, transform)| transform.upgrade());
-        if let Some(known) = known {
-            return known;
-        }
-        // Not under the lock: planning a long one takes a second. Of two threads' the last is known.
-        let made = Arc::new(Self { fft: FftPlanner::new().plan_fft_forward(half), unpack: Unpack::new(half) });
-        let mut transforms = lock();
-        transforms.retain(|(len, transform)| *len != half && transform.strong_count() > 0);
-        transforms.push((half, Arc::downgrade(&made)));
-        made
+    /// Of `half` complex points.
+    fn new(half: usize) -> Self {
+        Self { fft: FftPlanner::new().plan_fft_forward(half), unpack: Unpack::new(half) }
     }
 }
 

@@ -540,9 +540,6 @@ impl Alignment {
         mut best: Fit,
         mut support: Range<usize>,
     ) -> std::result::Result<Tracking, Reason> {
-        if self.noise_ratio == 0.0 && best.noise_share > MOSTLY_NOISE {
-            return Err(Reason::NoisyTarget { share: best.noise_share.min(1.0) });
-        }
         if self.estimator == Estimator::Aligned {
             let tracking = self.align(state, view, start, support, best)?;
             self.check_delay(tracking.delay_s * self.rate_hz, peaks)?;
@@ -556,6 +553,9 @@ impl Alignment {
             self.check_support(&support)?;
             self.place_answer(state, view, start, &support, true);
             best = Fit { goodness, ..self.refine(state, view, start, &support, best.tau, room, true)? };
+        }
+        if self.noise_ratio == 0.0 && best.noise_share > MOSTLY_NOISE {
+            return Err(Reason::NoisyTarget { share: best.noise_share.min(1.0) });
         }
         self.check_delay(best.tau, peaks)?;
         let tracking = self.finish(state, start, &support, &best, None);
