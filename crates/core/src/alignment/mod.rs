@@ -67,7 +67,7 @@ const CLEAR_ODDS: f64 = 1e3 * LOG_ODDS;
 /// The bias of noise on the target may be this share of the standard deviation.
 const NOISY_SHARE: f64 = 0.05;
 /// Of noise alone that share of the target's energy, or of its velocity's, may be; what is left of more is no measure.
-const MOSTLY_NOISE: f64 = 0.5;
+const MOSTLY_NOISE: f64 = 0.7;
 /// A residual of so many times what white noise leaves is coloured, and this share of a target may then be noise.
 const COLOURED: f64 = 2.0;
 const UNKNOWN_NOISE: f64 = 0.2;
