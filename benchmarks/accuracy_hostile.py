@@ -226,6 +226,9 @@ def judged_tone(
     target, clean = motion.samples(RATE_HZ), GAIN * motion.samples(RATE_HZ, delay_s)
     std, heard = share * float(np.std(clean)), HEARD * np.std(target)
     measured = clean + std * unit_noise(rng, clean.shape, COLOURS[colour])
+    exact = (i // 3) % 2 == 0
+    if not exact:
+        target = target + std / GAIN * rng.standard_normal(clean.shape)
     found: Counter[tuple[str, str]] = Counter()
     compared: Counter[str] = Counter()
     for reading in tone_readings(target, measured, size, None):
@@ -236,7 +239,8 @@ def judged_tone(
         found[place, "ambiguous"] += ambiguous
         found[place, "otherwise"] += not determined and not ambiguous
         # A moving window may lean on the whole record, so what it determines may be ambiguous alone.
-        of_interest = ambiguous or (determined and (place == WHOLE or "monitor" in place))
+        # The likelihoods that are compared are those of an exact target.
+        of_interest = exact and (ambiguous or (determined and (place == WHOLE or "monitor" in place)))
         if of_interest and compared[place, ambiguous] < size.margins:
             compared[place, ambiguous] += 1
             _, margin = turns.best(measured, std, reading.first, reading.last)
@@ -248,7 +252,7 @@ def judged_tone(
         place, determined = reading.place, np.isfinite(reading.delay_s)
         found[place, "expected n"] += 1
         found[place, "expected wrong"] += bool(determined and abs(reading.delay_s - delay_s) > period_s / 4)
-        if not determined:
+        if not determined and exact:
             found[place, "expected missing"] += bool(np.std(target[reading.first : reading.last]) >= heard)
     return found
 
@@ -263,7 +267,8 @@ def tones(bench: Bench) -> None:
         "### Tones and narrow bands",
         "",
         f"Gain {GAIN:g}, {RATE_HZ:g} Hz, delays of -20 to +40 ms, noise of {percent(min(size.shares))} to"
-        f" {percent(max(size.shares))} % of measured's deviation, white and AR(0.9), {size.tone_draws} draws of each."
+        f" {percent(max(size.shares))} % of measured's deviation, white and AR(0.9), {size.tone_draws} draws of each,"
+        " half of them with as much white noise on the target (of these no likelihoods are compared)."
         " Cells: readings; of them wrong by more than a quarter of a period; ambiguous / needlessly so (the turns'"
         f" log-likelihoods, with the noise's own spectrum, more than {NEEDLESS:g} apart; up to {size.margins} of a"
         f" record looked at); rash (determined, though less than {RASH:g} apart; not of moving windows, which lean on"

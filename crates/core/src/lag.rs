@@ -6,7 +6,7 @@
 //!
 //! summed over the judged samples, the target taken from outside the window where there is some; each lag is divided by the
 //! energy of its own stretch of target. Both signals are first averaged over as many samples as leave nine tenths of the
-//! target's energy (a straight line taken out): a peak needs no more resolution than a fifth of the shortest period, as it is
+//! target's energy (a straight line taken out; more of a broad band's): a peak needs no more resolution than a fifth of the shortest period, as it is
 //! read from the cosine through the three entries around it, which is the correlation of a narrow band, and nearly that of others.
 
 use pulp::{Arch, NullaryFnOnce};
@@ -16,8 +16,10 @@ use crate::reason::Reason;
 use crate::sums;
 use crate::window::Detrend;
 
-/// Averaging may cost this share of the target's energy.
-const KEPT_ENERGY: f64 = 0.9;
+/// Averaging may cost this share of the target's energy;
+const LOST: f64 = 0.1;
+/// and this share in any case.
+const TELLING: f64 = 0.03;
 /// Samples that are averaged at most.
 pub(crate) const MAX_STEP: usize = 64;
 /// Averaged samples that are correlated at most: the stretch in which the target moves most.
@@ -29,6 +31,8 @@ const FARTHER: usize = 4;
 const WELL_FOLLOWED: f64 = 0.98;
 /// and so little of what a correlation leaves must be left there for it to be the place.
 const LEFT: f64 = 0.2;
+/// A motion is narrow whose lowest correlation is as low as this share of the highest.
+const NARROW: f64 = 0.7;
 /// Fewest cycles of the target in the window: more than half a wave, whose delay cannot be told from an offset.
 const MIN_CYCLES: f64 = 0.6;
 /// Peaks that are looked at: a tone has as many as it has turns within reach.
@@ -80,12 +84,19 @@ pub(crate) struct Peaks {
     pub(crate) reach: usize,
     /// Cycles that the target moves through in the window.
     pub(crate) cycles: f64,
+    /// The lowest correlation seen.
+    lowest: f64,
 }
 
 impl Peaks {
     /// Highest first; only those that may be as high as the first, and the one nearest to the expected delay.
     pub(crate) fn peaks(&self) -> &[Peak] {
         &self.peaks[..self.n_peaks]
+    }
+
+    /// The correlation swings to both sides: a motion of nearly one frequency.
+    pub(crate) fn is_narrow(&self) -> bool {
+        self.lowest < -NARROW * self.first().correlation
     }
 
     /// The highest.
@@ -175,11 +186,8 @@ impl Search {
         if near.cycles < MIN_CYCLES {
             return Err(Reason::FewCycles { found: near.cycles });
         }
-        let mut found =
-            Peaks { peaks: [Peak::default(); MAX_PEAKS], n_peaks: 0, step: near.step, reach, cycles: near.cycles };
-        let correlations = &state.correlations[..2 * near.lags + 1];
-        let lowest = found.collect(correlations, near, expected);
-        let highest = found.first().correlation;
+        let found = Peaks::collect(state, near, reach, expected);
+        let (lowest, highest) = (found.lowest, found.first().correlation);
         let opposite = -lowest > highest + OPPOSITE_MARGIN;
         if opposite || highest < WELL_FOLLOWED {
             // Half a cycle out of reach looks like a sign, and a whole one like the delay: what lies farther away tells.
@@ -227,13 +235,19 @@ impl Search {
         // Lines are orthogonal to what is left of them.
         let left = |energy: f64, n: usize, step: usize| energy - line.map_or(0.0, |line| line.energy(n, step as f64));
         let all = left(sums::energy(own), n, 1);
-        let mut step = self.max_step;
-        while step > 1 {
+        let mut lost = |step: usize| {
             sums::block_means(own, step, &mut measured[..n / step]);
-            if left(sums::energy(&measured[..n / step]), n / step, step) * step as f64 >= KEPT_ENERGY * all {
+            1.0 - left(sums::energy(&measured[..n / step]), n / step, step) * step as f64 / all
+        };
+        let mut step = self.max_step;
+        let mut less = if step > 1 { lost(step) } else { 0.0 };
+        while step > 1 && less > TELLING {
+            let at_half = if step > 2 { lost(step / 2) } else { 0.0 };
+            // Of a narrow band half the step loses a quarter; a broad one may have its peak between two steps.
+            if less <= LOST && at_half < 0.3 * less {
                 break;
             }
-            step /= 2;
+            (step, less) = (step / 2, at_half);
         }
         let n = n / step;
         // What is looked at farther away is as much as there is room for.
@@ -275,9 +289,11 @@ impl Search {
 }
 
 impl Peaks {
-    /// Takes the peaks of what stands at `correlations`, highest first; returns how low the lowest trough is.
-    fn collect(&mut self, correlations: &[f64], searched: Correlated, expected: Option<f64>) -> f64 {
-        let Correlated { lags, step, .. } = searched;
+    /// The peaks of the correlations that stand in the state, highest first.
+    fn collect(state: &SearchState, searched: Correlated, reach: usize, expected: Option<f64>) -> Self {
+        let Correlated { lags, step, cycles, .. } = searched;
+        let correlations = &state.correlations[..2 * lags + 1];
+        let mut found = Self { peaks: [Peak::default(); MAX_PEAKS], n_peaks: 0, step, reach, cycles, lowest: 0.0 };
         let mut lowest = 0.0_f64;
         let mut nearest: Option<Peak> = None;
         for k in 0..correlations.len() {
@@ -301,20 +317,19 @@ impl Peaks {
             {
                 nearest = Some(peak);
             }
-            self.keep(peak);
+            found.keep(peak);
         }
-        let best = self.first().correlation;
-        let high = self.peaks[..self.n_peaks].iter().filter(|p| p.correlation >= best - PEAK_MARGIN).count();
-        self.n_peaks = high;
+        let best = found.first().correlation;
+        found.n_peaks = found.peaks().iter().filter(|p| p.correlation >= best - PEAK_MARGIN).count();
         if let Some(peak) = nearest
             && peak.correlation >= best - EXPECTED_MARGIN
-            && self.peaks().iter().all(|p| p.lag != peak.lag)
+            && found.peaks().iter().all(|p| p.lag != peak.lag)
         {
-            let at = self.n_peaks.min(MAX_PEAKS - 1);
-            self.peaks[at] = peak;
-            self.n_peaks = at + 1;
+            let at = found.n_peaks.min(MAX_PEAKS - 1);
+            found.peaks[at] = peak;
+            found.n_peaks = at + 1;
         }
-        lowest
+        Self { lowest, ..found }
     }
 
     /// Inserts in order, dropping the lowest.
@@ -330,10 +345,10 @@ impl Peaks {
 }
 
 /// Where between its neighbours, and how high, the cosine through three entries around a peak is highest:
-/// cos w = (b + a) / 2h,  tan(w x) = (a - b) / (2 h sin w); the parabola's where there is no such cosine.
+/// cos w = (b + a) / 2h,  tan(w x) = (a - b) / (2 h sin w); the parabola's where a period of it would have less than three.
 fn summit(before: f64, here: f64, after: f64) -> (f64, f64) {
     let cosine = 0.5 * (before + after) / here;
-    if here > 0.0 && cosine.abs() < 1.0 {
+    if here > 0.0 && cosine > -0.5 && cosine < 1.0 {
         let omega = cosine.acos();
         let angle = (0.5 * (after - before) / (here * omega.sin())).atan();
         let shift = angle / omega;

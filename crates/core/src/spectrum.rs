@@ -604,28 +604,3 @@ fn unpack_group(z: &[Complex<f64>], half: usize, k: usize, twiddle: &[Complex<f6
     }
     (lower, upper)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn plan(n_samples: usize, window: Window) -> Spectrum {
-        let (data_decimation, frequency_decimation) = (1, 1);
-        let (detrend, band_hz, rate_hz) = (Detrend::None, None, 1.0);
-        let config =
-            SpectrumConfig { n_samples, rate_hz, data_decimation, frequency_decimation, window, detrend, band_hz };
-        Spectrum::new(config).unwrap()
-    }
-
-    #[test]
-    fn plans_of_one_length_share_their_tables_while_one_is_in_use() {
-        // A length of which no other test makes plans.
-        let first = plan(50_000, Window::Boxcar);
-        let second = plan(40_000, Window::Hann);
-        assert!(Arc::ptr_eq(&first.transform, &second.transform));
-        assert!(!Arc::ptr_eq(&first.transform, &plan(20_000, Window::Boxcar).transform));
-        let left = Arc::downgrade(&first.transform);
-        drop((first, second));
-        assert!(left.upgrade().is_none());
-    }
-}

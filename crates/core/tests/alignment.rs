@@ -33,8 +33,12 @@ fn noise(n: usize, mut seed: u64) -> Vec<f64> {
 }
 
 fn evaluate(target: &[f64], measured: &[f64], config: EvaluatorConfig) -> Tracking {
-    let evaluator = Evaluator::new(target.len(), RATE_HZ, config).expect("a possible plan");
-    evaluator.evaluate(&mut evaluator.state(), &Pair::new(target, measured, RATE_HZ).unwrap()).expect("judged")
+    evaluate_at(RATE_HZ, target, measured, config)
+}
+
+fn evaluate_at(rate_hz: f64, target: &[f64], measured: &[f64], config: EvaluatorConfig) -> Tracking {
+    let evaluator = Evaluator::new(target.len(), rate_hz, config).expect("a possible plan");
+    evaluator.evaluate(&mut evaluator.state(), &Pair::new(target, measured, rate_hz).unwrap()).expect("judged")
 }
 
 fn least_squares() -> EvaluatorConfig {
@@ -362,6 +366,88 @@ fn no_turn_of_a_tone_is_taken_for_another() {
                 let found = evaluate(&target[middle.clone()], &measured[middle], config);
                 assert!((found.delay_s - delay_s).abs() < 1e-3, "{frequency_hz} {delay_s} {off}: {found:?}");
             }
+        }
+    }
+}
+
+/// The target's own noise, at one delay and at another, is no evidence for either.
+#[test]
+fn no_turn_of_a_tone_is_taken_for_another_where_both_channels_have_noise() {
+    let n = 2048;
+    for (draw, (on_target, on_measured)) in
+        [(0.001, 0.001), (0.02, 0.02), (0.002, 0.007)].into_iter().cycle().take(24).enumerate()
+    {
+        let tone = |i: usize, delay_s: f64| (2.0 * PI * 25.0 * (i as f64 / RATE_HZ - delay_s) + 1.0).sin();
+        let (first, second) = (noise(n, 50 + draw as u64), noise(n, 800 + draw as u64));
+        let target: Vec<f64> = (0..n).map(|i| tone(i, 0.0) + on_target * first[i]).collect();
+        let measured: Vec<f64> = (0..n).map(|i| 0.95 * tone(i, 0.013) + on_measured * second[i]).collect();
+        for band_hz in [None, Some((0.0, 60.0))] {
+            let config = EvaluatorConfig { band_hz, ..least_squares() };
+            let found = evaluate(&target, &measured, config);
+            assert!(matches!(found.reason, Some(Reason::Ambiguous { .. })), "{draw} {band_hz:?}: {found:?}");
+            for off in [-0.4, 0.0, 0.4] {
+                let found = evaluate(
+                    &target,
+                    &measured,
+                    EvaluatorConfig { expected_delay_s: Some(0.013 + off / 25.0), ..config },
+                );
+                assert!((found.delay_s - 0.013).abs() < 1e-3, "{draw} {band_hz:?} {off}: {found:?}");
+            }
+        }
+    }
+}
+
+/// A line a little beside the tone, on measured alone, is as strong in every cycle: what it makes of two turns is no evidence.
+#[test]
+fn a_line_beside_the_tone_does_not_choose_its_turn() {
+    let n = 10_240;
+    let ramp = |t: f64| (t / 2.0).min((20.0 - t) / 2.0).clamp(0.0, 1.0);
+    let tone = |t: f64| ramp(t) * (20.0 * PI * t).sin();
+    let at = |i: usize| i as f64 / 512.0;
+    let target: Vec<f64> = (0..n).map(|i| tone(at(i))).collect();
+    let errors = noise(n, 77);
+    for phase in 0..16 {
+        let line = |t: f64| 0.1 * (20.2 * PI * t + 0.4 * f64::from(phase)).sin();
+        let measured: Vec<f64> = (0..n).map(|i| 0.95 * tone(at(i) - 0.017) + line(at(i)) + 0.01 * errors[i]).collect();
+        let found = evaluate_at(512.0, &target, &measured, least_squares());
+        assert!(found.delay_s.is_nan() || (found.delay_s - 0.017).abs() < 0.01, "{phase}: {found:?}");
+    }
+}
+
+/// Most of the energy is slow, and what tells the delay is a peak narrower than the averages that serve the slow part.
+#[test]
+fn a_narrow_peak_is_not_stepped_over() {
+    let n = 8192;
+    let uniform = noise(300, 35);
+    let parts: Vec<(f64, f64, f64)> = (0..100)
+        .map(|k| {
+            let f = 0.2 * 1024.0_f64.powf((k as f64 + 0.5) / 100.0);
+            (2.0 * PI * f, (1.0 + 0.3 * uniform[k]) / f.sqrt(), 2.0 * PI * uniform[100 + k])
+        })
+        .collect();
+    let motion = |t: f64| parts.iter().map(|(w, a, p)| a * (w * t + p).sin()).sum::<f64>();
+    let target: Vec<f64> = (0..n).map(|i| motion(i as f64 / RATE_HZ)).collect();
+    for delay_s in [0.004607, 0.0153, -0.0312] {
+        let measured: Vec<f64> = (0..n).map(|i| 0.97 * motion(i as f64 / RATE_HZ - delay_s)).collect();
+        let found = evaluate(&target, &measured, least_squares());
+        assert!((found.delay_s - delay_s).abs() < 2e-6, "{delay_s}: {found:?}");
+    }
+}
+
+/// A turn of it lies within reach, and fits but for the envelope.
+#[test]
+fn a_turn_within_reach_is_not_taken_for_a_delay_beyond_it() {
+    let n = 10_240;
+    let at = |i: usize| i as f64 / 512.0;
+    let ramped = |t: f64| (t / 8.0).min((20.0 - t) / 8.0).clamp(0.0, 1.0) * (4.0 * PI * t).sin();
+    let pulse = |t: f64| (-((t - 10.0) / 2.0).powi(2)).exp() * (50.0 * PI * t).sin();
+    for (motion, delays_s) in [(&ramped as &dyn Fn(f64) -> f64, [0.4, -0.3, 0.28]), (&pulse, [0.28, -0.29, 0.3])] {
+        let target: Vec<f64> = (0..n).map(|i| motion(at(i))).collect();
+        let errors = noise(n, 9);
+        for delay_s in delays_s {
+            let measured: Vec<f64> = (0..n).map(|i| motion(at(i) - delay_s) + 0.005 * errors[i]).collect();
+            let reason = evaluate_at(512.0, &target, &measured, least_squares()).reason;
+            assert!(matches!(reason, Some(Reason::BeyondMaxDelay { .. })), "{delay_s}: {reason:?}");
         }
     }
 }

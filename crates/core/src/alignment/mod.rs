@@ -26,7 +26,7 @@ use crate::alignment::weighting::{Energies, Weighting};
 use crate::causal::CausalDecimator;
 use crate::error::Result;
 use crate::floor;
-use crate::lag::{MAX_PEAKS, MAX_STEP, Peaks, Search, SearchState, View};
+use crate::lag::{MAX_PEAKS, MAX_STEP, Peak, Peaks, Search, SearchState, View};
 use crate::lagrange::{AFTER, BEFORE, NODES, Taps};
 use crate::noise::{
     Autoregression, Changes, Influence, MAX_ORDER, NoisyTarget, Precision, Sampling, Spread, SpreadState, cell_width,
@@ -62,8 +62,15 @@ const MAX_REFERENCES: usize = 3;
 const LEAST_GAIN: f64 = 1.0;
 /// Noise changes over time where it meets the difference of two fits with this many times the variance of steady noise.
 const UNSTEADY: f64 = 1.5;
+/// Parts of a window over which noise that goes on alike adds up, and by what factor steady noise does so but rarely.
+const PARTS: usize = 16;
+const UNLIKELY: f64 = 1.5;
 /// So much less likely, were the noise white, it is less likely in any noise.
 const CLEAR_ODDS: f64 = 1e3 * LOG_ODDS;
+/// Each later look at a peak may go one sample further.
+const LOOKS: f64 = 3.0;
+/// A turn out of reach is looked at where a fit leaves more of measured than this.
+const LEFT_BY_A_TURN: f64 = 3e-4;
 /// The bias of noise on the target may be this share of the standard deviation.
 const NOISY_SHARE: f64 = 0.05;
 /// Of noise alone that share of the target's energy, or of its velocity's, may be; what is left of more is no measure.
@@ -169,6 +176,8 @@ pub(crate) struct AlignmentState {
     /// frequencies, where the target's is not 0.
     target_noise: f64,
     measured_noise: f64,
+    /// The same of the target where it is taken for exact, too.
+    target_floor: f64,
     /// Target and measured, decimated, and the buffers of each level.
     decimated: [Vec<f64>; 2],
     levels: Vec<AlignmentState>,
@@ -242,20 +251,44 @@ struct Odds {
     excess: f64,
     /// sum e_least^2 (e - e_least)^2
     variance: f64,
+    /// sum (e^2 - e_least^2)^2
+    variance_of_terms: f64,
+    /// Of sums over parts of the window, sum (sum e_least d)^2 with d = e - e_least, and the same a quarter of a period later,
+    /// which no fit makes small: their mean, for sixteen, eight or four parts, whichever is largest.
+    variance_of_parts: f64,
     /// sum (e - e_least)^2
     distance: f64,
 }
 
 impl Odds {
     fn of(residual: &[f64], least: &[f64]) -> Self {
-        let (mut excess, mut variance, mut distance) = (0.0, 0.0, 0.0);
-        for (e, least) in residual.iter().zip(least) {
-            let d = e - least;
-            excess += d * (e + least);
-            variance += (least * d) * (least * d);
-            distance += d * d;
+        let (mut excess, mut variance, mut variance_of_terms) = (0.0, 0.0, 0.0);
+        let (mut distance, mut of_slope) = (0.0, 0.0);
+        let mut parts = [(0.0, 0.0); PARTS];
+        let part = residual.len().div_ceil(PARTS).max(1);
+        let d = |i: usize| residual[i] - least[i];
+        let (mut before, mut here) = (0.0, d(0));
+        for i in 0..residual.len() {
+            let after = if i + 1 < residual.len() { d(i + 1) } else { 0.0 };
+            let slope = after - before;
+            let term = here * (residual[i] + least[i]);
+            let product = least[i] * here;
+            excess += term;
+            variance += product * product;
+            variance_of_terms += term * term;
+            distance += here * here;
+            of_slope += slope * slope;
+            parts[i / part].0 += product;
+            parts[i / part].1 += least[i] * slope;
+            (before, here) = (here, after);
         }
-        Self { excess, variance, distance }
+        let scale = if of_slope > 0.0 { distance / of_slope } else { 0.0 };
+        let of_parts = |width: usize| {
+            let sum = |p: &[(f64, f64)]| p.iter().fold((0.0, 0.0), |(s, q), part| (s + part.0, q + part.1));
+            parts.chunks(width).map(sum).map(|(s, q)| 0.5 * (s * s + scale * q * q)).sum::<f64>()
+        };
+        let variance_of_parts = of_parts(1).max(of_parts(2)).max(of_parts(4));
+        Self { excess, variance, variance_of_terms, variance_of_parts, distance }
     }
 }
 
@@ -341,6 +374,7 @@ impl Alignment {
                 correlation: [0.0; NODES],
             },
             target_noise: 0.0,
+            target_floor: 0.0,
             measured_noise: 0.0,
             decimated: std::array::from_fn(|_| {
                 vec![0.0; self.levels.iter().map(|l| l.alignment.longest_view()).max().unwrap_or(0)]
@@ -373,12 +407,13 @@ impl Alignment {
         expected: Option<f64>,
     ) -> std::result::Result<Tracking, Reason> {
         state.target_noise = 0.0;
+        let own = start - view.origin..start + self.n_samples - view.origin;
+        let (target, measured) = (&view.target[own.clone()], &view.measured[own]);
+        state.target_floor = floor::variance(target, 1) / floor::of_correlated(&self.correlation);
         if self.noise_ratio > 0.0 || self.noise == Noise::Coloured {
             return self.judge(state, view, start, expected);
         }
-        let own = start - view.origin..start + self.n_samples - view.origin;
-        let (target, measured) = (&view.target[own.clone()], &view.measured[own]);
-        let motion = Motion::of(target, floor::variance(target, 1) / floor::of_correlated(&self.correlation));
+        let motion = Motion::of(target, state.target_floor);
         let high = motion.noise / motion.variance;
         if !(high > FAST_SHARE || motion.is_noisy()) {
             return self.judge(state, view, start, expected);
@@ -394,6 +429,7 @@ impl Alignment {
         }
         // The highest frequencies are motion, as measured follows them; only what it does not follow is noise.
         let motion = Motion { noise: motion.noise * (1.0 - followed), ..motion };
+        state.target_floor = motion.noise;
         let found = if motion.is_noisy() {
             self.judge_noisy(state, view, start, expected, &motion)?
         } else {
@@ -467,6 +503,7 @@ impl Alignment {
         let lower = &mut state.levels[level];
         lower.measured_noise = measured_noise;
         lower.target_noise = noise * variance;
+        lower.target_floor = lower.target_noise;
         let found = alignment.judge(lower, &view, margin as usize, expected.map(|d| d / factor as f64));
         state.decimated = [target, measured];
         found
@@ -614,6 +651,7 @@ impl Alignment {
         };
         let within = support.start - start..support.end - start;
         let (window_power, fourths) = self.window_moments(&within);
+        let bins_per_piece = self.bins_per_piece(window_power, fourths);
         let AlignmentState { bins: [y, _, o], weighting, .. } = state;
         let mut energies = Energies {
             gain: score.gain,
@@ -624,10 +662,13 @@ impl Alignment {
             residual: &mut weighting.factors,
         };
         self.kept.spectrum.visit_pair([y, o], &mut energies);
-        let bins_per_piece =
-            (self.kept.spectrum.folded_len() as f64 * fourths / (window_power * window_power)).max(1.0);
         weighting.learn(cell_width(bins_per_piece), 1.0 / (self.noise_ratio.powi(-2) + score.gain * score.gain));
         weighting.refresh(self.kept.correction.as_deref(), &self.kept.cosines);
+    }
+
+    /// Kept bins for each that is independent.
+    fn bins_per_piece(&self, window_power: f64, fourths: f64) -> f64 {
+        (self.kept.spectrum.folded_len() as f64 * fourths / (window_power * window_power)).max(1.0)
     }
 
     /// Longest stretch of record that a window needs.
@@ -640,8 +681,52 @@ impl Alignment {
         2 * self.search.reach() + MAX_STEP + 2 * NODES
     }
 
-    /// Refines the peaks and takes the best, whose signals stand in the state afterwards.
+    /// The best of the peaks, whose signals stand in the state afterwards; none where a turn out of reach fits far better.
     fn best(
+        &self,
+        state: &mut AlignmentState,
+        view: &View<'_>,
+        start: usize,
+        found: &Peaks,
+        limit: f64,
+        expected: Option<f64>,
+        in_bins: bool,
+    ) -> std::result::Result<(Fit, Range<usize>), Reason> {
+        let (fit, support) = self.best_within(state, view, start, found, limit, expected, in_bins)?;
+        let spacing = |p: &Peak| (p.lag - fit.tau).abs();
+        let others = found.peaks().iter().map(spacing).filter(|distance| *distance > room(found.step));
+        let period = match others.min_by(f64::total_cmp) {
+            Some(period) => period,
+            None if found.is_narrow() && fit.residual > LEFT_BY_A_TURN * fit.products.oo => {
+                self.n_samples as f64 / found.cycles
+            }
+            None => return Ok((fit, support)),
+        };
+        let turns = [fit.tau - period, fit.tau + period];
+        let mut moved = false;
+        for turn in turns.into_iter().filter(|turn| turn.abs() > limit) {
+            moved = true;
+            let room = room(found.step).max(0.2 * period);
+            let (least, most) = (fit.tau.min(turn) - room - LOOKS, fit.tau.max(turn) + room + LOOKS);
+            let support = self.support(view, start, least, most);
+            if self.check_support(&support).is_err() {
+                continue;
+            }
+            self.place_answer(state, view, start, &support, in_bins);
+            let Ok(here) = self.refine(state, view, start, &support, fit.tau, room, in_bins) else { continue };
+            let Ok(there) = self.refine(state, view, start, &support, turn, room, in_bins) else { continue };
+            self.place_residual(state, view, start, &support, &there);
+            let freedom = independent(&state.signals.measured[support.start - start..support.end - start]);
+            let floor = EXACT * here.products.oo;
+            if 0.5 * freedom * (here.residual.max(floor) / there.residual.max(floor)).ln() > LOG_ODDS {
+                return Err(Reason::BeyondMaxDelay { max_delay_s: limit / self.rate_hz });
+            }
+        }
+        if moved { self.around(state, view, start, fit.tau, found.step, in_bins) } else { Ok((fit, support)) }
+    }
+
+    /// Refines the peaks and takes the best, whose signals stand in the state afterwards.
+    fn best_within(
         &self,
         state: &mut AlignmentState,
         view: &View<'_>,
@@ -705,8 +790,7 @@ impl Alignment {
 
     /// The support of a search from `least` to `most`.
     fn support_around(&self, view: &View<'_>, start: usize, least: f64, most: f64, step: usize) -> Range<usize> {
-        // Each later look may go one sample further.
-        let room = room(step) + 3.0;
+        let room = room(step) + LOOKS;
         self.support(view, start, least - room, most + room)
     }
 
@@ -714,8 +798,16 @@ impl Alignment {
     /// exp([`LOG_ODDS`]). `least` has the least residual.
     ///
     /// With the noise whitened by an autoregression of the likeliest one's residual, D = sum e^2 - sum e_best^2, the odds are
-    /// exp(n/2 log(sum e^2 / sum e_best^2)), or exp(D^2 / 2 V), V = sum e_best^2 (e - e_best)^2, where V is larger than steady
-    /// noise makes it. Over bins, the residual's correlation tells how many samples are independent.
+    /// exp(n/2 log(sum e^2 / sum e_best^2)), or the least of exp(D^2 / 2 V) with
+    ///
+    /// ```text
+    /// V = sum e_best^2 (e - e_best)^2             where noise that changes makes it larger than steady noise does
+    /// V = sum over parts (sum e_best (e - e_best))^2    likewise where noise goes on alike, as a line beside a tone does
+    /// V = sum (e^2 - e_best^2)^2                  where the target has noise: e - e_best holds it at both delays (Vuong, 1989)
+    /// ```
+    ///
+    /// Over bins, their number and the residual's correlation tell how many samples n are independent, and a noisy target gives
+    /// V = 8 (sum e_best^2)^2 / n.
     fn keep_equal(
         &self,
         state: &mut AlignmentState,
@@ -729,15 +821,25 @@ impl Alignment {
         let within = support.start - start..support.end - start;
         let floor = EXACT * least.products.oo;
         let white = |freedom: f64, f: &Fit| 0.5 * freedom * (f.residual.max(floor) / least.residual.max(floor)).ln();
-        if in_bins {
+        let (weight, fourths) = self.window_moments(&within);
+        let n = within.len();
+        let of_target = least.gain * least.gain * state.target_floor * weight;
+        let below = |excess: f64, variance: f64| 0.5 * excess * excess / variance < LOG_ODDS;
+        if in_bins && self.noise_ratio == 0.0 {
             self.place_residual(state, view, start, support, &least);
-            let freedom = independent(&state.signals.measured[within]);
-            turns.retain(|f| white(freedom, f) < LOG_ODDS);
+            let residual = &state.signals.measured[within];
+            let noisy_target = of_target * n as f64 > sums::energy(residual);
+            let of_bins = 2.0 * self.kept.spectrum.n_bins() as f64 / self.bins_per_piece(weight, fourths);
+            let freedom = independent(residual).min(of_bins);
+            let all = least.residual.max(floor);
+            let variance = 8.0 * all * all / freedom;
+            turns.retain(|f| {
+                white(freedom, f) < LOG_ODDS || (noisy_target && below(f.residual.max(floor) - all, variance))
+            });
             return least;
         }
-        let (weight, _) = self.window_moments(&within);
+        let noisy_target = self.noise_ratio > 0.0 || of_target * n as f64 > least.residual;
         turns.retain(|f| white(weight, f) < CLEAR_ODDS);
-        let n = within.len();
         let mut whitened = std::mem::take(&mut state.whitened_residual);
         let mut best = least;
         // What is least when every sample weighs alike need not be the likeliest in coloured noise.
@@ -762,8 +864,13 @@ impl Alignment {
                 }
                 let excess = odds.excess.max(0.0);
                 let steady = 0.5 * weight * ((all + excess) / all).ln();
-                let changing = odds.variance > UNSTEADY * all / weight * odds.distance;
-                steady < LOG_ODDS || (changing && 0.5 * excess * excess / odds.variance < LOG_ODDS)
+                let of_steady = all / weight * odds.distance;
+                let varying = odds.variance > UNSTEADY * of_steady;
+                let alike = odds.variance_of_parts > UNLIKELY * of_steady;
+                steady < LOG_ODDS
+                    || (varying && below(excess, odds.variance))
+                    || (alike && below(excess, odds.variance_of_parts))
+                    || (noisy_target && below(excess, odds.variance_of_terms))
             });
             match likelier {
                 Some(fit) => best = fit,
