@@ -65,6 +65,8 @@ const UNSTEADY: f64 = 1.5;
 /// Parts of a window over which noise that goes on alike adds up, and by what factor steady noise does so but rarely.
 const PARTS: usize = 16;
 const UNLIKELY: f64 = 1.5;
+/// Noise at two delays of the target differs from one turn to the next by chance: of many turns and windows the largest counts.
+const TAILS: f64 = 1.6;
 /// So much less likely, were the noise white, it is less likely in any noise.
 const CLEAR_ODDS: f64 = 1e3 * LOG_ODDS;
 /// Each later look at a peak may go one sample further.
@@ -803,7 +805,8 @@ impl Alignment {
     /// ```text
     /// V = sum e_best^2 (e - e_best)^2             where noise that changes makes it larger than steady noise does
     /// V = sum over parts (sum e_best (e - e_best))^2    likewise where noise goes on alike, as a line beside a tone does
-    /// V = sum (e^2 - e_best^2)^2                  where the target has noise: e - e_best holds it at both delays (Vuong, 1989)
+    /// V = sum (e^2 - e_best^2)^2                  where the target has noise: e - e_best holds it at both delays (Vuong, 1989;
+    ///                                             times TAILS)
     /// ```
     ///
     /// Over bins, their number and the residual's correlation tell how many samples n are independent, and a noisy target gives
@@ -832,7 +835,7 @@ impl Alignment {
             let of_bins = 2.0 * self.kept.spectrum.n_bins() as f64 / self.bins_per_piece(weight, fourths);
             let freedom = independent(residual).min(of_bins);
             let all = least.residual.max(floor);
-            let variance = 8.0 * all * all / freedom;
+            let variance = TAILS * 8.0 * all * all / freedom;
             turns.retain(|f| {
                 white(freedom, f) < LOG_ODDS || (noisy_target && below(f.residual.max(floor) - all, variance))
             });
@@ -870,7 +873,7 @@ impl Alignment {
                 steady < LOG_ODDS
                     || (varying && below(excess, odds.variance))
                     || (alike && below(excess, odds.variance_of_parts))
-                    || (noisy_target && below(excess, odds.variance_of_terms))
+                    || (noisy_target && below(excess, TAILS * odds.variance_of_terms))
             });
             match likelier {
                 Some(fit) => best = fit,
