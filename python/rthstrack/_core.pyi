@@ -32,12 +32,13 @@ __all__ = [
 ]
 
 _Averaged = tuple[float, float, float, float, complex]
-_Precision = tuple[float, tuple[float, float], float, tuple[float, float], float, float, float, str]
+_Bad = list[tuple[str, str, int, int, int]]
+_Precision = tuple[float, tuple[float, float], float, tuple[float, float], float, float, float, _Bad, str]
 _Numbers = tuple[_Averaged, _Precision]
 _Array = NDArray[np.float64]
 _Readings = tuple[
     tuple[_Array, _Array, _Array, _Array, _Array, NDArray[np.bool_]],
-    tuple[_Array, _Array, _Array, _Array, _Array, _Array, list[str]],
+    tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array, _Bad, list[str]],
 ]
 _Spectra = tuple[_Array, _Array, NDArray[np.complex128], NDArray[np.complex128]]
 

@@ -82,6 +82,7 @@ class Settings:
     expected_delay_s: float | None = None
     noise: str = "white"
     noise_ratio: float = 0.0
+    bad_samples: str = "leave_out"
 
     def _checked(self) -> Settings:
         """The same with plain Python types, so that it can be hashed, compared and written."""
@@ -98,6 +99,7 @@ class Settings:
             None if self.expected_delay_s is None else _number("expected_delay_s", self.expected_delay_s),
             str(self.noise),
             _number("noise_ratio", self.noise_ratio),
+            str(self.bad_samples),
         )
 
 
@@ -185,6 +187,34 @@ def _ends(name: str, interval: NDArray[np.float64]) -> dict[str, NDArray[np.floa
     return {f"{stem}_low{unit}": interval[:, 0], f"{stem}_high{unit}": interval[:, 1]}
 
 
+@dataclass(frozen=True, slots=True)
+class BadSamples:
+    """Samples of one channel that are no motion: their kind and number, and where the first is.
+
+    channel: "target" or "measured". kind: "spike" (one sample that leaves and returns), "dropout" (a stretch of one value
+    to which the signal jumps), "frozen" (a stretch of the last value), "clipped" (peaks cut off), "held" (each value is
+    repeated until the next: `every` samples from one fresh value to the next; else 0). first: index; first_s: seconds.
+    """
+
+    channel: str
+    kind: str
+    count: int
+    first: int
+    first_s: float
+    every: int = 0
+
+
+def _bad_samples(entries: list[tuple[str, str, int, int, int]], rate_hz: float) -> tuple[BadSamples, ...]:
+    return tuple(
+        BadSamples(channel, kind, count, first, first / rate_hz, every) for channel, kind, count, first, every in entries
+    )
+
+
+def bad_words(found: tuple[BadSamples, ...]) -> str:
+    """What was found, for a table: "5 spike in measured from 1.2 s; ..."."""
+    return "; ".join(f"{b.count} {b.kind} in {b.channel} from {b.first_s:.6g} s" for b in found)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Tracking(_Result):
     """Amplitude and delay of measured over target for one record (Eqs 6-12, or by alignment).
@@ -194,8 +224,8 @@ class Tracking(_Result):
     the spectrum of what the fit leaves; `residual_coherence`: how far that still follows the target, 0 to 1;
     `goodness`: the share of measured that one gain and one delay explain. All are NaN for "fei", and where not
     determined. `target_noise_std`: standard deviation of the noise that is the target's own, in its unit, where it was
-    taken into account, else 0. `reason` says why there is no number, or no interval, and is empty where nothing is
-    missing.
+    taken into account, else 0. `bad_samples`: what was found and left out, for each actuator. `reason` says why there is
+    no number, or no interval, and is empty where nothing is missing.
     With `weights=True` also, per kept bin (n_bins,) or (n_bins, n_actuators): `frequency_hz` (n_bins,), `weights`
     (sum to one), `target_spectrum` and `measured_spectrum` (complex DFT of the windowed, zero-padded signals).
     """
@@ -217,6 +247,7 @@ class Tracking(_Result):
     residual_coherence: float | NDArray[np.float64] = math.nan
     goodness: float | NDArray[np.float64] = math.nan
     target_noise_std: float | NDArray[np.float64] = 0.0
+    bad_samples: tuple[BadSamples, ...] | tuple[tuple[BadSamples, ...], ...] = ()
     reason: str | tuple[str, ...] = ""
     frequency_hz: NDArray[np.float64] | None = None
     weights: NDArray[np.float64] | None = None
@@ -269,6 +300,7 @@ class MovingTracking(_Result):
     residual_coherence: NDArray[np.float64]
     goodness: NDArray[np.float64]
     target_noise_std: NDArray[np.float64]
+    bad_samples: tuple[BadSamples, ...] | tuple[tuple[BadSamples, ...], ...]
     reason: tuple[str, ...] | tuple[tuple[str, ...], ...]
 
     def _columns(self) -> dict[str, Any]:
@@ -493,6 +525,7 @@ def evaluate(
     expected_delay_s: float | None = None,
     noise: str = "white",
     noise_ratio: float = 0.0,
+    bad_samples: str = "leave_out",
     weights: bool = False,
 ) -> Tracking:
     """Amplitude and delay of measured over target for whole records (Guo, Xu and Chen 2014, Eqs 1-12; or by alignment).
@@ -518,6 +551,8 @@ def evaluate(
     noise, noise_ratio: of "least_squares" only. noise "coloured": both signals are whitened by an autoregression of
     what a first fit leaves, and fitted again. noise_ratio: standard deviation of the noise on target over that on
     measured; above 0, total least squares over the bins in which both stand clear of white noise.
+    bad_samples: "leave_out" (spikes, dropouts, frozen and clipped stretches have no part in the fit of "aligned" and
+    "least_squares", and of held samples the fresh ones are judged) or "keep"; what was found is `bad_samples`.
     weights: also return the kept bins with their weights and spectra.
 
     delay_s > 0: measured lags. Raises SignalError for samples that cannot be judged, SettingError for settings.
@@ -544,6 +579,7 @@ def evaluate(
         expected_delay_s,
         noise,
         noise_ratio,
+        bad_samples,
     )._checked()
     rate_hz = _number("rate_hz", rate_hz)
     return _tracking(_plan(len(t), rate_hz, settings), settings, rate_hz, t, m, weights)
@@ -570,14 +606,17 @@ def _tracking(
         numbers = plan.evaluate(target, measured)
     averaged: Any
     reason: str | tuple[str, ...]
+    bad: Any
     if target.ndim == 1:
-        averaged, (*precision, reason) = numbers[0]
+        averaged, (*precision, entries, reason) = numbers[0]
+        bad = _bad_samples(entries, rate_hz)
     else:
         averaged = [np.array(v) for v in zip(*(n[0] for n in numbers), strict=True)]
-        *found_precision, reasons = zip(*(n[1] for n in numbers), strict=True)
+        *found_precision, each, reasons = zip(*(n[1] for n in numbers), strict=True)
         precision, reason = [np.array(v) for v in found_precision], tuple(reasons)
+        bad = tuple(_bad_samples(entries, rate_hz) for entries in each)
     about = (plan.n_bins, plan.delta_f_hz, rate_hz, len(target), settings)
-    fields: tuple[Any, ...] = (*averaged, *about, *precision, reason, *spectra)
+    fields: tuple[Any, ...] = (*averaged, *about, *precision, bad, reason, *spectra)
     return Tracking(*fields)
 
 
@@ -618,6 +657,7 @@ def evaluate_moving(
     expected_delay_s: float | None = None,
     noise: str = "white",
     noise_ratio: float = 0.0,
+    bad_samples: str = "leave_out",
 ) -> MovingTracking:
     """A(t), d(t) and f_eq(t): `evaluate` on windows of window_s, one every hop_s.
 
@@ -644,6 +684,7 @@ def evaluate_moving(
         expected_delay_s,
         noise,
         noise_ratio,
+        bad_samples,
     )._checked()
     rate_hz, window_s, hop_s = _number("rate_hz", rate_hz), _number("window_s", window_s), _number("hop_s", hop_s)
     ratio = _number("minimum_std_ratio", minimum_std_ratio)
@@ -651,15 +692,18 @@ def evaluate_moving(
     time_s = found[0][0][0]
     averaged: Any
     reasons: Any
+    bad: Any
     if t.ndim == 1:
-        (_, *averaged), (*precision, reason) = found[0]
+        (_, *averaged), (*precision, entries, reason) = found[0]
         reasons = tuple(reason)
+        bad = _bad_samples(entries, rate_hz)
     else:
         averaged = [np.stack(column, axis=1) for column in list(zip(*(f[0] for f in found), strict=True))[1:]]
-        *found_precision, each = zip(*(f[1] for f in found), strict=True)
+        *found_precision, each_bad, each = zip(*(f[1] for f in found), strict=True)
+        bad = tuple(_bad_samples(entries, rate_hz) for entries in each_bad)
         precision = [np.stack(column, axis=1) for column in found_precision]
         reasons = tuple(tuple(r) for r in each)
-    columns = (time_s, *averaged, window_s, hop_s, ratio, rate_hz, settings, *precision, reasons)
+    columns = (time_s, *averaged, window_s, hop_s, ratio, rate_hz, settings, *precision, bad, reasons)
     return MovingTracking(*columns)
 
 

@@ -9,6 +9,8 @@
 //! target's energy (a straight line taken out; more of a broad band's): a peak needs no more resolution than a fifth of the shortest period, as it is
 //! read from the cosine through the three entries around it, which is the correlation of a narrow band, and nearly that of others.
 
+use std::ops::Range;
+
 use pulp::{Arch, NullaryFnOnce};
 
 use crate::pair::Pair;
@@ -51,12 +53,14 @@ pub(crate) struct View<'a> {
     pub(crate) measured: &'a [f64],
     /// Index in the record of the first sample of both.
     pub(crate) origin: usize,
+    /// Stretches of target and of measured that are no motion, by their index in the record; a straight line stands there.
+    pub(crate) gaps: [&'a [Range<usize>]; 2],
 }
 
 impl<'a> View<'a> {
     /// The whole of a record.
     pub(crate) fn whole(pair: &Pair<'a>) -> Self {
-        Self { target: pair.target(), measured: pair.measured(), origin: 0 }
+        Self { target: pair.target(), measured: pair.measured(), origin: 0, gaps: [&[], &[]] }
     }
 
     /// Index in the record past the last sample.
@@ -155,6 +159,11 @@ impl Search {
         let most = MAX_STEP.min(wanted / 4).min(n_samples / 64).max(1);
         let max_step = 1 << most.ilog2();
         Self { n_samples, max_step, reach: wanted.next_multiple_of(max_step), rate_hz, arch: Arch::new() }
+    }
+
+    /// Length of the windows.
+    pub(crate) fn n_samples(&self) -> usize {
+        self.n_samples
     }
 
     /// The largest lag looked at, in samples.

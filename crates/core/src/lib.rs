@@ -28,6 +28,7 @@
 #![forbid(unsafe_code)]
 
 mod alignment;
+pub mod bad_samples;
 pub mod causal;
 pub mod decimate;
 pub mod dynamics;
@@ -51,6 +52,7 @@ mod sums;
 pub mod tracking;
 pub mod window;
 
+pub use bad_samples::{BAD_KINDS, BadCount, BadFound, BadKind, BadSamples};
 pub use causal::{CausalDecimator, CausalState};
 pub use decimate::Decimator;
 pub use error::{Error, Result, Signal};

@@ -254,9 +254,11 @@ impl Monitor {
             measured: ring(),
         };
         let reading = |actuator| Reading { actuator, ..Reading::EMPTY };
+        let mut evaluator = self.evaluator.state();
+        evaluator.reserve(self.window + self.evaluator.samples_before());
         MonitorState {
             actuators: (0..self.config.n_actuators).map(|_| actuator()).collect(),
-            evaluator: self.evaluator.state(),
+            evaluator,
             readings: (0..self.config.n_actuators).map(reading).collect(),
             index: 0,
             wait: self.window,

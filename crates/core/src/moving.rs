@@ -1,5 +1,6 @@
 //! The evaluation over moving windows: A(t), d(t), f_eq(t).
 
+use crate::bad_samples::BadFound;
 use crate::error::{Error, Result};
 use crate::pair::{MIN_SAMPLES, Pair};
 use crate::reason::Reason;
@@ -51,6 +52,8 @@ pub struct MovingTracking {
     pub goodness: Vec<f64>,
     /// Standard deviation of the noise that is the target's own, where it was taken into account.
     pub target_noise: Vec<f64>,
+    /// Bad samples of the whole record, which are left out.
+    pub bad_samples: BadFound,
     /// Whether the window could be judged.
     pub valid: Vec<bool>,
     /// Why it could not, or why there is no interval.
@@ -84,7 +87,7 @@ pub fn evaluate_moving(pair: &Pair<'_>, config: &MovingConfig) -> Result<MovingT
     let variance = RunningVariance::new(pair.target());
     let least = ratio * ratio * variance.of(0, n);
     let starts = (0..n - window + 1).step_by(hop);
-    let mut out = MovingTracking::with_capacity(starts.len());
+    let mut out = MovingTracking { bad_samples: moving.bad_samples(), ..MovingTracking::with_capacity(starts.len()) };
     for start in starts {
         let tracking = if variance.of(start, start + window) < least {
             Tracking::undetermined(Reason::Still)
@@ -115,6 +118,7 @@ impl MovingTracking {
             residual_coherence: Vec::with_capacity(n),
             goodness: Vec::with_capacity(n),
             target_noise: Vec::with_capacity(n),
+            bad_samples: BadFound::NONE,
             valid: Vec::with_capacity(n),
             reason: Vec::with_capacity(n),
         }

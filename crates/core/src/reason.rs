@@ -32,6 +32,11 @@ pub enum Reason {
         /// From the delay to either end of its interval, in seconds.
         reach_s: f64,
     },
+    /// Too many samples are bad: spikes, dropouts, frozen or clipped stretches.
+    BadSamples {
+        /// Share of the samples that would be left out.
+        share: f64,
+    },
     /// Two delays fit equally well.
     Ambiguous {
         /// One of them, in seconds.
@@ -119,6 +124,12 @@ impl fmt::Display for Reason {
                 "not determined: noise leaves the delay uncertain by {:.3} ms either way, more than half a turn; \
                  take a longer window or a band with less noise",
                 1e3 * reach_s
+            ),
+            Reason::BadSamples { share } => write!(
+                f,
+                "not determined: {:.0} % of the samples are bad (spikes, dropouts, frozen or clipped); look at the sensors \
+                 and their cables",
+                100.0 * share
             ),
             Reason::Ambiguous { delay_s, other_s } => write!(
                 f,

@@ -6,6 +6,7 @@ use std::sync::OnceLock;
 use num_complex::Complex;
 
 use crate::alignment::{Alignment, AlignmentState};
+use crate::bad_samples::{BadFound, BadSamples, Examination};
 use crate::decimate::{Chebyshev, Decimator, Stream};
 use crate::error::{Error, Result, Signal};
 use crate::lag::View;
@@ -92,6 +93,8 @@ pub struct EvaluatorConfig {
     pub noise: Noise,
     /// Standard deviation of the noise on target over that on measured; above zero, least squares is total least squares.
     pub noise_ratio: f64,
+    /// What the estimators that shift the target do with samples that are no motion.
+    pub bad_samples: BadSamples,
 }
 
 impl Default for EvaluatorConfig {
@@ -109,6 +112,7 @@ impl Default for EvaluatorConfig {
             expected_delay_s: None,
             noise: Noise::White,
             noise_ratio: 0.0,
+            bad_samples: BadSamples::LeaveOut,
         }
     }
 }
@@ -198,6 +202,8 @@ pub struct Tracking {
     pub goodness: f64,
     /// Standard deviation of the noise that is the target's own, in its unit, where it was taken into account; else 0.
     pub target_noise: f64,
+    /// Bad samples that were found, by kind, and left out.
+    pub bad_samples: BadFound,
     /// Why there is no number, or no interval.
     pub reason: Option<Reason>,
 }
@@ -218,6 +224,7 @@ impl Tracking {
             residual_coherence: f64::NAN,
             goodness: f64::NAN,
             target_noise: 0.0,
+            bad_samples: BadFound::NONE,
             reason: Some(reason),
         }
     }
@@ -294,6 +301,17 @@ pub struct EvaluatorState {
     decimated: [Vec<f64>; 2],
     filter: Vec<f64>,
     alignment: Option<AlignmentState>,
+    examination: Examination,
+}
+
+impl EvaluatorState {
+    /// Makes room for the bad samples of views of `n`, so that finding some allocates nothing.
+    pub(crate) fn reserve(&mut self, n: usize) {
+        if let Some(alignment) = &mut self.alignment {
+            alignment.reserve(n);
+            self.examination.reserve(n);
+        }
+    }
 }
 
 impl Evaluator {
@@ -378,6 +396,7 @@ impl Evaluator {
                 decimated: Default::default(),
                 filter: Vec::new(),
                 alignment: Some(alignment.state()),
+                examination: Examination::default(),
             },
         }
     }
@@ -393,20 +412,31 @@ impl Evaluator {
             decimated: [vec![0.0; decimated], vec![0.0; decimated]],
             filter: vec![0.0; filter],
             alignment: None,
+            examination: Examination::default(),
         }
     }
 
-    /// Evaluates one pair (Eqs 1 to 12, or by alignment). Allocates nothing.
+    /// Evaluates one pair (Eqs 1 to 12, or by alignment). Allocates nothing, but for the first pair that has bad samples.
     ///
     /// # Errors
     /// [`Error::Plan`] for a pair of another length or rate, [`Error::NotFinite`], [`Error::NoEnergy`], [`Error::Range`].
     pub fn evaluate(&self, state: &mut EvaluatorState, pair: &Pair<'_>) -> Result<Tracking> {
-        if let (Some(alignment), Some(state)) = (&self.alignment, &mut state.alignment) {
+        if self.alignment.is_some() {
             self.check(pair)?;
-            pair.check_fourth_powers()?;
-            return Ok(alignment.estimate(state, &View::whole(pair), 0, self.expected()));
         }
-        self.published(state, pair)
+        self.shifted(state, pair, 0).unwrap_or_else(|| self.published(state, pair))
+    }
+
+    /// By alignment, over the window that starts at `start`; None of the published estimator.
+    fn shifted(&self, state: &mut EvaluatorState, pair: &Pair<'_>, start: usize) -> Option<Result<Tracking>> {
+        let EvaluatorState { alignment: state, examination, .. } = state;
+        let (alignment, state) = self.alignment.as_ref().zip(state.as_mut())?;
+        let view = View::whole(pair);
+        let estimate = |()| match self.config.bad_samples {
+            BadSamples::LeaveOut => alignment.estimate_examined(state, examination, &view, start, self.expected()),
+            BadSamples::Keep => alignment.estimate(state, &view, start, self.expected()),
+        };
+        Some(pair.check_fourth_powers().map(estimate))
     }
 
     /// The delay that is expected, in samples.
@@ -422,9 +452,8 @@ impl Evaluator {
     /// Evaluates the last `n_samples` of a pair; the estimators that shift the target also see what comes before them.
     pub(crate) fn evaluate_last(&self, state: &mut EvaluatorState, pair: &Pair<'_>) -> Result<Tracking> {
         let start = pair.n_samples() - self.n_samples;
-        if let (Some(alignment), Some(state)) = (&self.alignment, &mut state.alignment) {
-            pair.check_fourth_powers()?;
-            return Ok(alignment.estimate(state, &View::whole(pair), start, self.expected()));
+        if let Some(found) = self.shifted(state, pair, start) {
+            return found;
         }
         self.published(state, &Pair::new(&pair.target()[start..], &pair.measured()[start..], pair.rate_hz())?)
     }
@@ -790,6 +819,8 @@ pub(crate) struct Moving<'a> {
     state: EvaluatorState,
     pair: &'a Pair<'a>,
     streams: Option<[Stream; 2]>,
+    /// The whole record's bad samples; None where there are none.
+    examination: Option<Examination>,
     /// The delay that is expected, or else that of the whole record, in samples: it tells a window whose target is one tone
     /// which turn it is.
     expected: Option<f64>,
@@ -805,19 +836,33 @@ impl Evaluator {
                 stream(pair.target()).zip(stream(pair.measured())).map(|(target, measured)| [target, measured])
             }
         };
-        let expected =
-            self.alignment.as_ref().and_then(|_| self.expected().or_else(|| Alignment::expected(pair, &self.config)));
-        Moving { evaluator: self, state: self.state(), pair, streams, expected }
+        let examination = self.alignment.as_ref().and_then(|_| Alignment::examined(pair, &self.config));
+        let view = view(pair, examination.as_ref());
+        let expected = self
+            .alignment
+            .as_ref()
+            .and_then(|_| self.expected().or_else(|| Alignment::expected(&view, &self.config, pair.rate_hz())));
+        Moving { evaluator: self, state: self.state(), pair, streams, examination, expected }
     }
 }
 
+/// A pair without its bad samples.
+fn view<'a>(pair: &Pair<'a>, examination: Option<&'a Examination>) -> View<'a> {
+    examination.map_or_else(|| View::whole(pair), |e| e.view(0))
+}
+
 impl Moving<'_> {
+    /// What was found in the whole record.
+    pub(crate) fn bad_samples(&self) -> BadFound {
+        self.examination.as_ref().map_or(BadFound::NONE, Examination::found)
+    }
+
     /// The reading of the window that starts at sample `start`: of `fei` that of [`Evaluator::evaluate`], bit for bit; the other
     /// estimators also see the target outside the window. The samples are finite.
     pub(crate) fn at(&mut self, start: usize) -> Result<Tracking> {
-        let Self { evaluator, state, pair, streams, expected } = self;
+        let Self { evaluator, state, pair, streams, examination, expected } = self;
         if let (Some(alignment), Some(state)) = (&evaluator.alignment, &mut state.alignment) {
-            return Ok(alignment.estimate(state, &View::whole(pair), start, *expected));
+            return Ok(alignment.estimate(state, &view(pair, examination.as_ref()), start, *expected));
         }
         let range = start..start + evaluator.n_samples;
         let window = Pair::new(&pair.target()[range.clone()], &pair.measured()[range], pair.rate_hz())?;

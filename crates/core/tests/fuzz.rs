@@ -1,8 +1,8 @@
 //! Any samples under any settings give a number, a reason or an error, and never a panic (overflow checks are on). `RTHSTRACK_FUZZ` sets how many.
 
 use rthstrack::{
-    Decimator, Detrend, Estimator, Evaluator, EvaluatorConfig, Monitor, MonitorConfig, MovingConfig, Noise, Pair,
-    Window, evaluate_moving,
+    BadSamples, Decimator, Detrend, Estimator, Evaluator, EvaluatorConfig, Monitor, MonitorConfig, MovingConfig, Noise,
+    Pair, Window, evaluate_moving,
 };
 
 /// A multiplicative congruential generator: the same cases on every machine.
@@ -62,7 +62,7 @@ fn any_finite_samples_are_answered() {
         let mut random = Random(case.wrapping_mul(0x9e37_79b9_7f4a_7c15) + 1);
         let n = random.pick(&[4, 5, 17, 40, 64, 100, 257, 600, 1025]);
         let rate_hz = random.pick(&[50.0, 200.0, 1024.0, 4096.0]);
-        let target = random.signal(n);
+        let mut target = random.signal(n);
         let mut measured = random.signal(n);
         if random.below(3) > 0 {
             // Late or early by whole samples, and noisy.
@@ -72,6 +72,17 @@ fn any_finite_samples_are_answered() {
                 measured[i] = 0.9 * target[from] + 1e-3 * measured[i];
             }
         }
+        // Spikes, dropouts, freezes and holds anywhere, in either channel.
+        for _ in 0..random.pick(&[0, 0, 1, 3, 40]) {
+            let signal = if random.uniform() < 0.5 { &mut target } else { &mut measured };
+            let from = (random.uniform() * n as f64) as usize;
+            let to = (from + random.pick(&[1, 1, 2, 3, 8, 50, 1000])).min(n);
+            let value = random.pick(&[0.0, signal[from], 1e3, -3.0, signal[0]]);
+            signal[from..to].fill(value);
+        }
+        let every = random.pick(&[1, 1, 1, 1, 2, 3, 7, 40]);
+        let signal = if random.uniform() < 0.5 { &mut target } else { &mut measured };
+        (0..n).for_each(|i| signal[i] = signal[i / every * every]);
         let low = random.uniform() * rate_hz / 4.0;
         let config = EvaluatorConfig {
             estimator: random.pick(&Estimator::NAMES).1,
@@ -86,6 +97,7 @@ fn any_finite_samples_are_answered() {
             expected_delay_s: random.pick(&[None, None, Some(0.0), Some(-1e-3)]),
             noise: random.pick(&[Noise::White, Noise::White, Noise::Coloured]),
             noise_ratio: random.pick(&[0.0, 0.0, 0.0, 0.3]),
+            bad_samples: random.pick(&[BadSamples::LeaveOut, BadSamples::LeaveOut, BadSamples::Keep]),
         };
         let Ok(pair) = Pair::new(&target, &measured, rate_hz) else { continue };
         let Ok(evaluator) = Evaluator::new(n, rate_hz, config) else { continue };

@@ -14,6 +14,8 @@ use crate::shared::Shared;
 
 /// For the page and the terminal view.
 #[derive(Debug, Clone)]
+// A reading is what is sent most; in a box each would be allocated.
+#[allow(clippy::large_enum_variant)]
 pub(crate) enum Item {
     Reading(Reading),
     Alarm(usize, Alarm),

@@ -5,17 +5,27 @@ use pyo3::prelude::*;
 use rthstrack::{MovingConfig, Pair};
 
 use crate::error::to_py;
-use crate::tracking::{Settings, words};
+use crate::tracking::{BadEntry, Settings, bad_entries, words};
 
 type Numbers<'py> = Bound<'py, PyArray1<f64>>;
 /// (n_readings, 2)
 type Pairs<'py> = Bound<'py, PyArray2<f64>>;
 
 /// time_s, amplitude, phase_rad, delay_s, equivalent_frequency_hz, valid; amplitude_std, amplitude_interval, delay_std_s,
-/// delay_interval_s, residual_coherence, goodness, target_noise_std, reason
+/// delay_interval_s, residual_coherence, goodness, target_noise_std, bad samples, reason
 type Arrays<'py> = (
     (Numbers<'py>, Numbers<'py>, Numbers<'py>, Numbers<'py>, Numbers<'py>, Bound<'py, PyArray1<bool>>),
-    (Numbers<'py>, Pairs<'py>, Numbers<'py>, Pairs<'py>, Numbers<'py>, Numbers<'py>, Numbers<'py>, Vec<String>),
+    (
+        Numbers<'py>,
+        Pairs<'py>,
+        Numbers<'py>,
+        Pairs<'py>,
+        Numbers<'py>,
+        Numbers<'py>,
+        Numbers<'py>,
+        Vec<BadEntry>,
+        Vec<String>,
+    ),
 );
 
 #[pyfunction]
@@ -53,6 +63,7 @@ pub(crate) fn evaluate_moving<'py>(
             moving.residual_coherence.into_pyarray(py),
             moving.goodness.into_pyarray(py),
             moving.target_noise.into_pyarray(py),
+            bad_entries(&moving.bad_samples),
             moving.reason.iter().map(|r| words(r.as_ref())).collect(),
         ),
     ))

@@ -4,7 +4,8 @@ use num_complex::Complex;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 use rthstrack::{
-    Decimator, Detrend, Estimator, EvaluatorConfig, EvaluatorState, Noise, Pair, Reason, Spectra, Tracking, Window,
+    BadCount, BadFound, BadKind, BadSamples, Decimator, Detrend, Estimator, EvaluatorConfig, EvaluatorState, Noise,
+    Pair, Reason, Spectra, Tracking, Window,
 };
 
 use crate::error::{choice, of_actuator, to_py};
@@ -14,8 +15,10 @@ use crate::signal::Columns;
 /// amplitude, phase_rad, delay_s, equivalent_frequency_hz, fei
 type Averaged = (f64, f64, f64, f64, Complex<f64>);
 /// amplitude_std, amplitude_interval, delay_std_s, delay_interval_s, residual_coherence, goodness,
-/// target_noise_std, reason
-type Precision = (f64, (f64, f64), f64, (f64, f64), f64, f64, f64, String);
+/// target_noise_std, bad samples, reason
+type Precision = (f64, (f64, f64), f64, (f64, f64), f64, f64, f64, Vec<BadEntry>, String);
+/// channel, kind, count, first, every
+pub(crate) type BadEntry = (&'static str, &'static str, u32, u32, u32);
 pub(crate) type Numbers = (Averaged, Precision);
 /// frequency_hz, weights, target_spectrum, measured_spectrum
 type SpectraArrays<'py> = (
@@ -36,9 +39,18 @@ pub(crate) fn numbers(t: &Tracking) -> Numbers {
             t.residual_coherence,
             t.goodness,
             t.target_noise,
+            bad_entries(&t.bad_samples),
             words(t.reason.as_ref()),
         ),
     )
+}
+
+/// What was found, an entry a channel and kind.
+pub(crate) fn bad_entries(found: &BadFound) -> Vec<BadEntry> {
+    let entry = |(channel, kind, bad): (usize, BadKind, BadCount)| {
+        (["target", "measured"][channel], kind.code(), bad.count, bad.first, bad.every)
+    };
+    found.iter().map(entry).collect()
 }
 
 /// A reason in words, nothing where there is none.
@@ -61,6 +73,7 @@ pub(crate) struct Settings {
     expected_delay_s: Option<f64>,
     noise: String,
     noise_ratio: f64,
+    bad_samples: String,
 }
 
 impl Settings {
@@ -79,6 +92,7 @@ impl Settings {
             expected_delay_s: self.expected_delay_s,
             noise: choice(py, "noise", &Noise::NAMES, &self.noise)?,
             noise_ratio: self.noise_ratio,
+            bad_samples: choice(py, "bad_samples", &BadSamples::NAMES, &self.bad_samples)?,
         })
     }
 }

@@ -23,6 +23,7 @@ use pulp::{Arch, Simd, WithSimd};
 use crate::alignment::grid::Grid;
 use crate::alignment::products::{Cross, Multiply, Products};
 use crate::alignment::weighting::{Energies, Weighting};
+use crate::bad_samples::{About, BadSamples, Examination};
 use crate::causal::CausalDecimator;
 use crate::error::Result;
 use crate::floor;
@@ -71,6 +72,9 @@ const TAILS: f64 = 1.6;
 const CLEAR_ODDS: f64 = 1e3 * LOG_ODDS;
 /// Each later look at a peak may go one sample further.
 const LOOKS: f64 = 3.0;
+/// A gap of target as short as this is bridged well; so many samples beside it are left out with it.
+const SHORT_GAP: usize = 2;
+const NEAREST: f64 = 2.0;
 /// A turn out of reach is looked at where a fit leaves more of measured than this.
 const LEFT_BY_A_TURN: f64 = 3e-4;
 /// The bias of noise on the target may be this share of the standard deviation.
@@ -180,9 +184,76 @@ pub(crate) struct AlignmentState {
     measured_noise: f64,
     /// The same of the target where it is taken for exact, too.
     target_floor: f64,
+    /// Stretches of the support that are left out, and how many samples they are.
+    lost: Vec<Range<usize>>,
+    n_lost: usize,
     /// Target and measured, decimated, and the buffers of each level.
     decimated: [Vec<f64>; 2],
+    gaps: [Vec<Range<usize>>; 2],
     levels: Vec<AlignmentState>,
+}
+
+impl AlignmentState {
+    /// Room for the gaps of views of `n` samples.
+    pub(crate) fn reserve(&mut self, n: usize) {
+        self.lost.reserve(n + 1);
+        self.gaps.iter_mut().for_each(|gaps| gaps.reserve(n / 2 + 1));
+        self.levels.iter_mut().for_each(|level| level.reserve(n));
+    }
+
+    /// Where the judged samples of `support` stand in the signals, one after the other.
+    fn within(&self, start: usize, support: &Range<usize>) -> Range<usize> {
+        support.start - start..support.end - start - self.n_lost
+    }
+
+    /// Finds which samples of `support` are bad, or are compared at delays from `least` to `most` with bad ones of the target.
+    fn lose(&mut self, gaps: [&[Range<usize>]; 2], support: &Range<usize>, least: f64, most: f64) {
+        let (before, after) = (AFTER as f64 + 1.0 - least.floor(), BEFORE as f64 + 1.0 + most.ceil());
+        let [mut target, mut measured] = gaps.map(|gaps| gaps.iter().peekable());
+        let middle = (0.5 * (least + most)).round();
+        let widened = |gap: &Range<usize>| {
+            let at = |index: f64| (index.max(0.0) as usize).clamp(support.start, support.end) - support.start;
+            if gap.len() <= SHORT_GAP {
+                // Its bridge is good enough for all but the nearest taps.
+                return at(gap.start as f64 + middle - NEAREST)..at(gap.end as f64 + middle + NEAREST);
+            }
+            at(gap.start as f64 - before)..at(gap.end as f64 + after)
+        };
+        let clipped = |gap: &Range<usize>| {
+            let at = |index: usize| index.clamp(support.start, support.end) - support.start;
+            at(gap.start)..at(gap.end)
+        };
+        self.lost.clear();
+        self.n_lost = 0;
+        loop {
+            let next = match (target.peek().map(|g| widened(g)), measured.peek().map(|g| clipped(g))) {
+                (Some(a), Some(b)) if a.start <= b.start => (a, target.next()).0,
+                (Some(_), Some(b)) | (None, Some(b)) => (b, measured.next()).0,
+                (Some(a), None) => (a, target.next()).0,
+                (None, None) => break,
+            };
+            if next.is_empty() {
+                continue;
+            }
+            match self.lost.last_mut() {
+                Some(last) if next.start <= last.end => last.end = last.end.max(next.end),
+                _ => self.lost.push(next),
+            }
+        }
+        self.n_lost = self.lost.iter().map(Range::len).sum();
+    }
+}
+
+/// What is left of `n` samples without the lost ones, and where it goes when it is put together.
+fn kept(lost: &[Range<usize>], n: usize) -> impl Iterator<Item = (Range<usize>, usize)> + '_ {
+    let ends = lost.iter().map(|gap| gap.end);
+    let starts = lost.iter().map(|gap| gap.start).chain([n]);
+    let mut at = 0;
+    std::iter::once(0).chain(ends).zip(starts).map(move |(from, to)| {
+        let here = at;
+        at += to - from;
+        (from..to, here)
+    })
 }
 
 /// n samples each, zero outside the judged ones.
@@ -377,10 +448,13 @@ impl Alignment {
             },
             target_noise: 0.0,
             target_floor: 0.0,
+            lost: Vec::new(),
+            n_lost: 0,
             measured_noise: 0.0,
             decimated: std::array::from_fn(|_| {
                 vec![0.0; self.levels.iter().map(|l| l.alignment.longest_view()).max().unwrap_or(0)]
             }),
+            gaps: std::array::from_fn(|_| Vec::new()),
             levels: self.levels.iter().map(|l| l.alignment.state()).collect(),
         }
     }
@@ -398,6 +472,23 @@ impl Alignment {
             Ok(tracking) => tracking,
             Err(reason) => Tracking::undetermined(reason),
         }
+    }
+
+    /// The same without the samples of `view` that are bad, which are looked for.
+    pub(crate) fn estimate_examined(
+        &self,
+        state: &mut AlignmentState,
+        examination: &mut Examination,
+        view: &View<'_>,
+        start: usize,
+        expected: Option<f64>,
+    ) -> Tracking {
+        let about = || About::find(&self.search, &mut state.search, view, start);
+        if !examination.examine([view.target, view.measured], about) {
+            return self.estimate(state, view, start, expected);
+        }
+        let tracking = self.estimate(state, &examination.view(view.origin), start, expected);
+        Tracking { bad_samples: examination.found(), ..tracking }
     }
 
     /// As the target is exact, or as its own noise demands.
@@ -470,7 +561,7 @@ impl Alignment {
             None => Err(Reason::TooShort { n_samples: 0 }),
         };
         // A lower rate's filter needs samples at both ends.
-        if matches!(found, Err(Reason::TooShort { .. })) {
+        if matches!(found, Err(Reason::TooShort { .. } | Reason::BadSamples { .. })) {
             state.target_noise = motion.noise;
             found = self.judge(state, view, start, expected);
         }
@@ -500,7 +591,25 @@ impl Alignment {
         let [mut target, mut measured] = std::mem::take(&mut state.decimated);
         decimator.block(&view.target[from..], &mut target[..n]);
         decimator.block(&view.measured[from..], &mut measured[..n]);
-        let view = View { target: &target[..n], measured: &measured[..n], origin: (first + margin) as usize };
+        let mut gaps = std::mem::take(&mut state.gaps);
+        for (gaps, of_samples) in gaps.iter_mut().zip(view.gaps) {
+            gaps.clear();
+            // All that the filter sees of a gap.
+            let at = |index: usize, filter: isize, round: isize| {
+                whole(index as isize - start as isize + filter, round) + margin
+            };
+            let seen = of_samples.iter().map(|gap| {
+                at(gap.start, -(delay as isize), 0).max(0) as usize
+                    ..(at(gap.end, delay as isize, factor as isize - 1) + 1).max(0) as usize
+            });
+            gaps.extend(seen.filter(|gap| !gap.is_empty()));
+        }
+        let view = View {
+            target: &target[..n],
+            measured: &measured[..n],
+            origin: (first + margin) as usize,
+            gaps: [&gaps[0], &gaps[1]],
+        };
         let measured_noise = state.measured_noise * variance;
         let lower = &mut state.levels[level];
         lower.measured_noise = measured_noise;
@@ -508,6 +617,7 @@ impl Alignment {
         lower.target_floor = lower.target_noise;
         let found = alignment.judge(lower, &view, margin as usize, expected.map(|d| d / factor as f64));
         state.decimated = [target, measured];
+        state.gaps = gaps;
         found
     }
 
@@ -555,7 +665,7 @@ impl Alignment {
                 let n = part.len() - p;
                 noise.whiten(&view.target[part.clone()], &mut first[..n]);
                 noise.whiten(&view.measured[part], &mut second[..n]);
-                let view = View { target: &first[..n], measured: &second[..n], origin: from + p };
+                let view = View { target: &first[..n], measured: &second[..n], origin: from + p, gaps: view.gaps };
                 let found =
                     self.around(state, &view, start, best.tau, peaks.step, false).and_then(|(best, support)| {
                         // Whitening leaves less of the motion than of the noise; that says nothing of the tracking.
@@ -587,9 +697,9 @@ impl Alignment {
         if !self.in_time && self.noise_ratio == 0.0 {
             // Other frequencies may have another delay: a part of a period away at most.
             let room = (0.2 * self.n_samples as f64 / peaks.cycles).min(self.search.reach() as f64).max(2.0);
-            support = self.support(view, start, best.tau - room, best.tau + room);
+            support = self.support(state, view, start, best.tau - room, best.tau + room);
             let goodness = best.goodness;
-            self.check_support(&support)?;
+            self.check_support(state, &support)?;
             self.place_answer(state, view, start, &support, true);
             best = Fit { goodness, ..self.refine(state, view, start, &support, best.tau, room, true)? };
         }
@@ -612,7 +722,7 @@ impl Alignment {
         if !(self.in_time && fit.noise > 0.0) {
             return 0.0;
         }
-        let within = support.start - start..support.end - start;
+        let within = state.within(start, support);
         let gain = fit.gain * fit.gain;
         let white = (state.measured_noise + gain * state.target_noise) * self.window_moments(&within).0;
         if fit.residual > COLOURED * white {
@@ -637,7 +747,7 @@ impl Alignment {
 
     /// Learns, with the target shifted by `lag`, where its energy stands above its noise; what is below only adds noise.
     fn weigh_bins(&self, state: &mut AlignmentState, view: &View<'_>, start: usize, lag: f64) {
-        let support = self.support(view, start, lag - 1.0, lag + 1.0);
+        let support = self.support(state, view, start, lag - 1.0, lag + 1.0);
         state.weighting.weights.fill(1.0);
         state.weighting.refresh(self.kept.correction.as_deref(), &self.kept.cosines);
         if support.len() < MIN_SUPPORT {
@@ -651,7 +761,7 @@ impl Alignment {
         let Some(score) = score(&products, lag, &ratio) else {
             return;
         };
-        let within = support.start - start..support.end - start;
+        let within = state.within(start, &support);
         let (window_power, fourths) = self.window_moments(&within);
         let bins_per_piece = self.bins_per_piece(window_power, fourths);
         let AlignmentState { bins: [y, _, o], weighting, .. } = state;
@@ -710,15 +820,15 @@ impl Alignment {
             moved = true;
             let room = room(found.step).max(0.2 * period);
             let (least, most) = (fit.tau.min(turn) - room - LOOKS, fit.tau.max(turn) + room + LOOKS);
-            let support = self.support(view, start, least, most);
-            if self.check_support(&support).is_err() {
+            let support = self.support(state, view, start, least, most);
+            if self.check_support(state, &support).is_err() {
                 continue;
             }
             self.place_answer(state, view, start, &support, in_bins);
             let Ok(here) = self.refine(state, view, start, &support, fit.tau, room, in_bins) else { continue };
             let Ok(there) = self.refine(state, view, start, &support, turn, room, in_bins) else { continue };
             self.place_residual(state, view, start, &support, &there);
-            let freedom = independent(&state.signals.measured[support.start - start..support.end - start]);
+            let freedom = independent(&state.signals.measured[state.within(start, &support)]);
             let floor = EXACT * here.products.oo;
             if 0.5 * freedom * (here.residual.max(floor) / there.residual.max(floor)).ln() > LOG_ODDS {
                 return Err(Reason::BeyondMaxDelay { max_delay_s: limit / self.rate_hz });
@@ -749,8 +859,8 @@ impl Alignment {
         let lags = || peaks.iter().map(|p| p.lag);
         let (least, most) = (lags().fold(f64::INFINITY, f64::min), lags().fold(f64::NEG_INFINITY, f64::max));
         // All are judged on the same samples.
-        let support = self.support_around(view, start, least, most, step);
-        self.check_support(&support)?;
+        let support = self.support_around(state, view, start, least, most, step);
+        self.check_support(state, &support)?;
         self.place_answer(state, view, start, &support, in_bins);
         let mut turns = Turns::default();
         for (i, peak) in peaks.iter().enumerate() {
@@ -783,17 +893,32 @@ impl Alignment {
         step: usize,
         in_bins: bool,
     ) -> std::result::Result<(Fit, Range<usize>), Reason> {
-        let support = self.support_around(view, start, lag, lag, step);
-        self.check_support(&support)?;
-        self.place_answer(state, view, start, &support, in_bins);
-        let fit = self.refine(state, view, start, &support, lag, room(step), in_bins)?;
-        Ok((fit, support))
+        let mut found = None;
+        // With gaps once more, where fewer samples are compared with them.
+        let has_gaps = view.gaps.iter().any(|gaps| !gaps.is_empty());
+        for (lag, step) in [(Some(lag), step), (None, 0)].into_iter().take(if has_gaps { 2 } else { 1 }) {
+            let lag = lag.or(found.as_ref().map(|(fit, _): &(Fit, Range<usize>)| fit.tau)).unwrap_or(0.0);
+            let support = self.support_around(state, view, start, lag, lag, step);
+            self.check_support(state, &support)?;
+            self.place_answer(state, view, start, &support, in_bins);
+            let fit = self.refine(state, view, start, &support, lag, room(step), in_bins)?;
+            found = Some((fit, support));
+        }
+        found.ok_or(Reason::NoConvergence)
     }
 
     /// The support of a search from `least` to `most`.
-    fn support_around(&self, view: &View<'_>, start: usize, least: f64, most: f64, step: usize) -> Range<usize> {
+    fn support_around(
+        &self,
+        state: &mut AlignmentState,
+        view: &View<'_>,
+        start: usize,
+        least: f64,
+        most: f64,
+        step: usize,
+    ) -> Range<usize> {
         let room = room(step) + LOOKS;
-        self.support(view, start, least - room, most + room)
+        self.support(state, view, start, least - room, most + room)
     }
 
     /// Keeps of `turns` those that fit as well as the likeliest, which is returned: whose likelihood is not below its by
@@ -821,7 +946,7 @@ impl Alignment {
         least: Fit,
         in_bins: bool,
     ) -> Fit {
-        let within = support.start - start..support.end - start;
+        let within = state.within(start, support);
         let floor = EXACT * least.products.oo;
         let white = |freedom: f64, f: &Fit| 0.5 * freedom * (f.residual.max(floor) / least.residual.max(floor)).ln();
         let (weight, fourths) = self.window_moments(&within);
@@ -902,7 +1027,7 @@ impl Alignment {
     }
 
     /// The samples of the window for which the target is known at all delays from `least` to `most`, in samples.
-    fn support(&self, view: &View<'_>, start: usize, least: f64, most: f64) -> Range<usize> {
+    fn known(&self, view: &View<'_>, start: usize, least: f64, most: f64) -> Range<usize> {
         let before = (most.ceil() + (BEFORE + 1) as f64).max(0.0) as usize;
         let after = ((-least).ceil() + (AFTER + 1) as f64).max(0.0) as usize;
         let from = start.max(view.origin + before);
@@ -910,9 +1035,37 @@ impl Alignment {
         from..to.max(from)
     }
 
-    fn check_support(&self, support: &Range<usize>) -> std::result::Result<(), Reason> {
+    /// The same less the bad ones, of which the state keeps account until it is asked for other delays.
+    fn support(
+        &self,
+        state: &mut AlignmentState,
+        view: &View<'_>,
+        start: usize,
+        least: f64,
+        most: f64,
+    ) -> Range<usize> {
+        let support = self.known(view, start, least, most);
+        state.lost.clear();
+        state.n_lost = 0;
+        if view.gaps.iter().all(|gaps| gaps.is_empty()) {
+            return support;
+        }
+        state.lose(view.gaps, &support, least, most);
+        if 2 * state.n_lost > support.len() {
+            // Between turns far apart the bridges of target's gaps must do.
+            let middle = 0.5 * (least + most);
+            state.lose(view.gaps, &support, middle, middle);
+        }
+        support
+    }
+
+    fn check_support(&self, state: &AlignmentState, support: &Range<usize>) -> std::result::Result<(), Reason> {
         if support.len() < MIN_SUPPORT || 2 * support.len() < self.n_samples {
             return Err(Reason::TooShort { n_samples: support.len() });
+        }
+        let left = support.len() - state.n_lost;
+        if left < MIN_SUPPORT || 2 * left < support.len() {
+            return Err(Reason::BadSamples { share: state.n_lost as f64 / support.len() as f64 });
         }
         Ok(())
     }
@@ -946,7 +1099,7 @@ impl Alignment {
         in_bins: bool,
     ) -> std::result::Result<Fit, Reason> {
         let (low, high) = (tau - room, tau + room);
-        let within = support.start - start..support.end - start;
+        let within = state.within(start, support);
         let known = if state.target_noise > 0.0 { state.target_noise * self.window_moments(&within).0 } else { 0.0 };
         // Where the score is known to be positive (the delay is larger) and negative.
         let (mut below, mut above) = (low, high);
@@ -1014,11 +1167,14 @@ impl Alignment {
 
     /// Measured over the judged samples, detrended and windowed.
     fn place_measured(&self, state: &mut AlignmentState, view: &View<'_>, start: usize, support: &Range<usize>) {
-        let within = support.start - start..support.end - start;
-        let measured = &mut state.signals.measured;
+        let within = state.within(start, support);
+        let AlignmentState { signals: Signals { measured, .. }, lost, .. } = state;
         clear_around(measured, &within);
-        measured[within.clone()]
-            .copy_from_slice(&view.measured[support.start - view.origin..support.end - view.origin]);
+        let from = support.start - view.origin;
+        for (kept, at) in kept(lost, support.len()) {
+            let to = within.start + at;
+            measured[to..to + kept.len()].copy_from_slice(&view.measured[from + kept.start..from + kept.end]);
+        }
         self.condition(measured, &within);
     }
 
@@ -1032,25 +1188,28 @@ impl Alignment {
         tau: f64,
     ) {
         let (whole, fraction) = fraction(tau);
-        let within = support.start - start..support.end - start;
-        let Signals { shifted, slope, .. } = &mut state.signals;
+        let within = state.within(start, support);
+        let AlignmentState { signals: Signals { shifted, slope, .. }, lost, .. } = state;
         let from = (support.start - view.origin + NODES).saturating_add_signed(whole) - NODES - BEFORE;
-        let samples = &view.target[from..from + within.len() + NODES - 1];
         for signal in [&mut *shifted, &mut *slope] {
             clear_around(signal, &within);
         }
-        self.arch.dispatch(Shift {
-            taps: &Taps::at(fraction),
-            samples,
-            value: &mut shifted[within.clone()],
-            slope: &mut slope[within.clone()],
-        });
+        let taps = Taps::at(fraction);
+        for (kept, at) in kept(lost, support.len()) {
+            let to = within.start + at..within.start + at + kept.len();
+            self.arch.dispatch(Shift {
+                taps: &taps,
+                samples: &view.target[from + kept.start..from + kept.end + NODES - 1],
+                value: &mut shifted[to.clone()],
+                slope: &mut slope[to],
+            });
+        }
         self.condition(shifted, &within);
         self.condition(slope, &within);
     }
 
     fn products_in_time(&self, state: &AlignmentState, start: usize, support: &Range<usize>) -> Products {
-        let within = support.start - start..support.end - start;
+        let within = state.within(start, support);
         let Signals { measured, shifted, slope } = &state.signals;
         self.arch.dispatch(Multiply {
             shifted: &shifted[within.clone()],
@@ -1091,7 +1250,7 @@ impl Alignment {
 
     /// measured becomes measured less the fit; returns which share of it the fit explains, 1 - sum e^2 / sum (o - mean)^2.
     fn leave_residual(&self, state: &mut AlignmentState, fit: &Fit, start: usize, support: &Range<usize>) -> f64 {
-        let within = support.start - start..support.end - start;
+        let within = state.within(start, support);
         let Signals { measured, shifted, slope } = &mut state.signals;
         let measured = &mut measured[within.clone()];
         let total = sums::sum(measured);
@@ -1103,7 +1262,7 @@ impl Alignment {
 
     /// The autoregression of the residual that stands in measured's place.
     fn autoregression(&self, state: &AlignmentState, start: usize, support: &Range<usize>) -> Autoregression {
-        let within = support.start - start..support.end - start;
+        let within = state.within(start, support);
         let (squares, fourths) = self.window_moments(&within);
         Autoregression::fit(&state.signals.measured[within], squares * squares / fourths)
     }
@@ -1137,10 +1296,10 @@ impl Alignment {
         self.kept.spectrum.transform_one(&mut state.scratch, &state.signals.measured, None, &mut state.bins[MEASURED]);
         for _ in 0..MAX_STEPS {
             let tau = fit.tau;
-            let known = self.support(view, start, tau, tau);
+            let known = self.known(view, start, tau, tau);
             if support.start < known.start || known.end < support.end {
-                support = self.support(view, start, tau - 1.0, tau + 1.0);
-                self.check_support(&support)?;
+                support = self.support(state, view, start, tau - 1.0, tau + 1.0);
+                self.check_support(state, &support)?;
                 self.place_measured(state, view, start, &support);
                 let AlignmentState { signals, bins, scratch, .. } = &mut *state;
                 self.kept.spectrum.transform_one(scratch, &signals.measured, None, &mut bins[MEASURED]);
@@ -1268,7 +1427,7 @@ impl Alignment {
         averaged: Option<Averaged>,
         exact: bool,
     ) -> Option<Precision> {
-        let within = support.start - start..support.end - start;
+        let within = state.within(start, support);
         let (window_power, fourths) = self.window_moments(&within);
         let AlignmentState {
             signals: Signals { measured, shifted, slope }, bins, scratch, low, spread, weighting, ..
@@ -1394,12 +1553,22 @@ impl Alignment {
         tracking
     }
 
-    /// The delay of the whole record, in samples, as far as it can be told: of the only peak of the correlation, or of the one
-    /// that fits better than all others.
-    pub(crate) fn expected(pair: &crate::Pair<'_>, config: &EvaluatorConfig) -> Option<f64> {
+    /// The bad samples of a whole record; None where there are none, or they are kept.
+    pub(crate) fn examined(pair: &crate::Pair<'_>, config: &EvaluatorConfig) -> Option<Examination> {
         let search = Search::new(pair.n_samples(), pair.rate_hz(), config.max_delay_s);
         let view = View::whole(pair);
-        let peaks = search.peaks(&mut search.state(), &view, 0, None).ok()?;
+        let mut examination = Examination::default();
+        let about = || About::find(&search, &mut search.state(), &view, 0);
+        (config.bad_samples == BadSamples::LeaveOut && examination.examine([view.target, view.measured], about))
+            .then_some(examination)
+    }
+
+    /// The delay of the whole record, in samples, as far as it can be told: of the only peak of the correlation, or of the one
+    /// that fits better than all others.
+    pub(crate) fn expected(view: &View<'_>, config: &EvaluatorConfig, rate_hz: f64) -> Option<f64> {
+        let n = view.target.len();
+        let search = Search::new(n, rate_hz, config.max_delay_s);
+        let peaks = search.peaks(&mut search.state(), view, 0, None).ok()?;
         if let [only] = peaks.peaks() {
             return Some(only.lag);
         }
@@ -1409,9 +1578,9 @@ impl Alignment {
             detrend: Detrend::Mean,
             ..EvaluatorConfig::default()
         };
-        let whole = Self::new(pair.n_samples(), pair.rate_hz(), &config).ok()?;
+        let whole = Self::new(n, rate_hz, &config).ok()?;
         let mut state = whole.state();
-        let best = whole.best(&mut state, &view, 0, &peaks, whole.limit(&peaks), None, false);
+        let best = whole.best(&mut state, view, 0, &peaks, whole.limit(&peaks), None, false);
         best.ok().map(|(fit, _)| fit.tau)
     }
 }
