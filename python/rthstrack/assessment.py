@@ -173,7 +173,7 @@ def assess(
     except (SettingError, SignalError) as error:
         slopes_note = f"not determined: {error}"
     response, response_note = _response(t, m, rate_hz, slopes, trusted)
-    depends = dependence(t, m, trusted, response)
+    depends = dependence(t, m, tracking, trusted, response)
     same, trusted = tracking is trusted, words.with_cause(trusted, depends)
     if same:
         tracking = trusted

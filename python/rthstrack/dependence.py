@@ -177,16 +177,42 @@ class _Fit:
         return odds
 
 
-def _motion(target: Floats, measured: Floats, rate_hz: float, trusted: Tracking) -> _Motion | None:
-    n, delay_s = target.size, float(trusted.delay_s)
-    size = fft.next_fast_len(n + int(rate_hz * abs(delay_s)) + 16, real=True)
-    pair = np.stack((target, measured))
-    pair -= pair.mean(axis=1, keepdims=True)
-    if trusted.settings.detrend == "linear":
-        t = np.arange(n) - (n - 1) / 2
-        pair -= (pair @ t)[:, None] / float(t @ t) * t
-    spectra = fft.rfft(pair, size, axis=1)
-    energy = spectra[0].real ** 2 + spectra[0].imag ** 2
+def _spectra(target: Floats, measured: Floats, tracking: Tracking) -> tuple[NDArray[np.complex128], Floats, int]:
+    """Both signals' low bins, at rest about zero outside the record; target's energy by bin; the transforms' length.
+
+    Taken over from the evaluation where it has them.
+    """
+    n, settings = target.size, tracking.settings
+    whole = settings.window == "boxcar" and settings.data_decimation == settings.frequency_decimation == 1
+    if whole and settings.band_hz is None and settings.detrend != "linear" and tracking.target_spectrum is not None:
+        assert tracking.measured_spectrum is not None
+        size = round(tracking.rate_hz / tracking.delta_f_hz)
+        low = min(size // 2, 2 * _MOST_SAMPLES // int(_OVERSAMPLING))
+        found = np.zeros((2, low + 1), dtype=complex)
+        found[0, 1:], found[1, 1:] = tracking.target_spectrum[:low], tracking.measured_spectrum[:low]
+        if settings.detrend == "none":
+            # What an offset adds; above the low bins it is nothing beside a motion.
+            turn = -2j * np.pi * np.arange(1, low + 1) / size
+            means = np.array(((target.mean(),), (measured.mean(),)))
+            found[:, 1:] -= means * ((np.exp(turn * n) - 1) / (np.exp(turn) - 1))
+        spectrum = tracking.target_spectrum
+        energy = np.concatenate(([0.0], spectrum.real**2 + spectrum.imag**2))
+    else:
+        pair = np.stack((target, measured))
+        pair -= pair.mean(axis=1, keepdims=True)
+        if settings.detrend == "linear":
+            t = np.arange(n) - (n - 1) / 2
+            pair -= (pair @ t)[:, None] / float(t @ t) * t
+        size = fft.next_fast_len(n + 16, real=True)
+        found = fft.rfft(pair, size, axis=1)
+        energy = found[0].real ** 2 + found[0].imag ** 2
+    energy[: found.shape[1]] = found[0].real ** 2 + found[0].imag ** 2
+    return found, energy, size
+
+
+def _motion(target: Floats, measured: Floats, tracking: Tracking, trusted: Tracking) -> _Motion | None:
+    n, delay_s, rate_hz = target.size, float(trusted.delay_s), trusted.rate_hz
+    spectra, energy, size = _spectra(target, measured, tracking)
     df = rate_hz / size
     # A noisy target is even over all frequencies.
     floor = float(np.median(energy[energy.size // 2 :]))
@@ -198,10 +224,9 @@ def _motion(target: Floats, measured: Floats, rate_hz: float, trusted: Tracking)
     if not total[-1] > 0:
         return None
     top = int(np.searchsorted(total, _ENERGY * total[-1])) + 2
-    top = min(top, int(_MOST_SAMPLES / _OVERSAMPLING * size / n), energy.size - 1)
-    last = min(int(_ROLL_OFF * top) + 2, energy.size - 1)
-    m = fft.next_fast_len(int(_OVERSAMPLING * top) + 8, real=True)
-    m = max(m, 2 * last + 2)
+    top = min(top, int(_MOST_SAMPLES / _OVERSAMPLING), energy.size - 1)
+    last = min(int(_ROLL_OFF * top) + 2, spectra.shape[1] - 1)
+    m = fft.next_fast_len(max(int(_OVERSAMPLING * top) + 8, 2 * last + 2), real=True)
     f = f_all[: last + 1]
     keep = np.where(
         f <= df * top, 1.0, np.cos(np.pi / 2 * np.clip((f - df * top) / max(df * (last - top), df), 0, 1)) ** 2
@@ -433,16 +458,18 @@ def _of_amplitude(amplitude: Floats, motion: _Motion) -> list[Floats]:
 def dependence(
     target: Floats,
     measured: Floats,
+    tracking: Tracking,
     trusted: Tracking,
     response: FrequencyResponse | None,
 ) -> Dependence | None:
     """What gain and delay depend on; None where they are one number each, as far as the record can tell.
 
-    trusted: the least-squares estimate, whose delay all is measured from; response: for the line over frequency.
+    tracking: with weights, for its spectra; trusted: the least-squares estimate, whose delay all is measured from;
+    response: for the line over frequency.
     """
     if not (math.isfinite(float(trusted.delay_s)) and float(trusted.amplitude) > 0):
         return None
-    motion = _motion(target, measured, trusted.rate_hz, trusted)
+    motion = _motion(target, measured, tracking, trusted)
     if motion is None:
         return None
     middle = (motion.time_s[0] + motion.time_s[-1]) / 2
