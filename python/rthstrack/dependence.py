@@ -32,13 +32,17 @@ NO_INTERVAL = (math.nan, math.nan)
 
 # The band holds this share of target's energy; the filter falls off over so much more; samples a second by its edge.
 _ENERGY, _ROLL_OFF, _OVERSAMPLING = 0.995, 1.35, 4.0
-_MOST_SAMPLES, _FEWEST_SAMPLES = 16_384, 100
+_MOST_SAMPLES, _FEWEST_SAMPLES, _FEWEST_PERIODS = 16_384, 60, 15
 # Near the ends the filter sees what lies outside the record: so many periods of the band's edge are left out.
 _ENDS = 3.0
 # On either side of a step lies so much of the energy.
 _MOVED = 3e-4
 # Changes below this are no finding: shares of delay and gain, and of the time between samples.
 _LEAST_DELAY, _LEAST_GAIN, _LEAST_SAMPLE = 0.07, 0.03, 0.05
+# Nor are changes in less than this share of the motion's energy.
+_PART = 0.005
+# Nor are those within so many half intervals of the difference; more where the place of the change was sought.
+_SURE, _SOUGHT = 1.2, 1.6
 # Probability of a false finding by noise; the place of a step is sought, which gives noise so many chances.
 _CHANCE, _PLACES = 1e-3, 30.0
 # Noise is taken to be independent from block to block: so many periods each, and between so many blocks in all.
@@ -55,7 +59,7 @@ _CLOCK_SHARE, _CLOCK_GAIN = 0.9, 0.01
 # Local amplitude is taken as no less than this share of its root mean square.
 _STILL = 0.03
 # Octaves of amplitude are told where the delay is known to this share, and the motion is so many times its own noise.
-_KNOWN, _CLEAR, _FEW, _SHOWN = 0.2, 10.0, 20, 0.7
+_KNOWN, _CLEAR, _FEW = 0.2, 10.0, 20
 # Amplitudes between which nine tenths of the energy lie.
 _ENERGY_ENDS = (0.05, 0.95)
 # What does not matter gives way to the next cause, where that explains at least so much of what it does.
@@ -178,11 +182,21 @@ class _Fit:
 
 
 def _spectra(target: Floats, measured: Floats, tracking: Tracking) -> tuple[NDArray[np.complex128], Floats, int]:
-    """Both signals' low bins, at rest about zero outside the record; target's energy by bin; the transforms' length.
+    """Both signals' low bins, less what rests at the ends; target's energy by bin; the transforms' length.
+
+    Less the line from end to end, where the target goes from one place to another, else less their means: so neither
+    jumps where the record ends, and what is lost is a line, which nobody asks for.
 
     Taken over from the evaluation where it has them.
     """
     n, settings = target.size, tracking.settings
+    few = 1 + n // 500
+    ends = np.array([(part[:few].mean(), part[-few:].mean()) for part in (target, measured)])
+    slope = (ends[:, 1] - ends[:, 0]) / max(n - few, 1)
+    first = ends[:, 0] - slope * (few - 1) / 2
+    if np.var(target - slope[0] * np.arange(n)) >= np.var(target):
+        # Cut off in full motion, not displaced: the line would be none of its own.
+        first, slope = np.array((target.mean(), measured.mean())), np.zeros(2)
     whole = settings.window == "boxcar" and settings.data_decimation == settings.frequency_decimation == 1
     if whole and settings.band_hz is None and settings.detrend != "linear" and tracking.target_spectrum is not None:
         assert tracking.measured_spectrum is not None
@@ -190,19 +204,18 @@ def _spectra(target: Floats, measured: Floats, tracking: Tracking) -> tuple[NDAr
         low = min(size // 2, 2 * _MOST_SAMPLES // int(_OVERSAMPLING))
         found = np.zeros((2, low + 1), dtype=complex)
         found[0, 1:], found[1, 1:] = tracking.target_spectrum[:low], tracking.measured_spectrum[:low]
-        if settings.detrend == "none":
-            # What an offset adds; above the low bins it is nothing beside a motion.
-            turn = -2j * np.pi * np.arange(1, low + 1) / size
-            means = np.array(((target.mean(),), (measured.mean(),)))
-            found[:, 1:] -= means * ((np.exp(turn * n) - 1) / (np.exp(turn) - 1))
+        # Less the line from end to end, by its transform; above the low bins it is nothing beside a motion.
+        turn = np.exp(-2j * np.pi * np.arange(1, low + 1) / size)
+        last = np.exp(-2j * np.pi * np.arange(1, low + 1) / size * n)
+        even = (last - 1) / (turn - 1)
+        rising = (n * last - turn * even) / (turn - 1)
+        if settings.detrend == "mean":
+            first = first - np.array((target.mean(), measured.mean()))
+        found[:, 1:] -= first[:, None] * even + slope[:, None] * rising
         spectrum = tracking.target_spectrum
         energy = np.concatenate(([0.0], spectrum.real**2 + spectrum.imag**2))
     else:
-        pair = np.stack((target, measured))
-        pair -= pair.mean(axis=1, keepdims=True)
-        if settings.detrend == "linear":
-            t = np.arange(n) - (n - 1) / 2
-            pair -= (pair @ t)[:, None] / float(t @ t) * t
+        pair = np.stack((target, measured)) - first[:, None] - slope[:, None] * np.arange(n)
         size = fft.next_fast_len(n + 16, real=True)
         found = fft.rfft(pair, size, axis=1)
         energy = found[0].real ** 2 + found[0].imag ** 2
@@ -257,9 +270,13 @@ def _motion(target: Floats, measured: Floats, tracking: Tracking, trusted: Track
     margin = min(_ENDS / (df * top), 0.08 * n / rate_hz)
     time_s = index * step_s
     inside = (time_s >= margin + max(delay_s, 0)) & (time_s <= (n - 1) / rate_hz - margin + min(delay_s, 0))
-    if inside.sum() < _FEWEST_SAMPLES:
+    if inside.sum() < _FEWEST_SAMPLES or top * n < _FEWEST_PERIODS * size:
         return None
-    kept = series[:, inside]
+    kept = np.concatenate((series, signs))[:, inside]
+    # A line is nobody's motion, see `_spectra`.
+    away = np.linspace(-1.0, 1.0, kept.shape[1])
+    kept -= kept.mean(axis=1, keepdims=True)
+    kept -= (kept @ away)[:, None] / float(away @ away) * away
     count = kept.shape[1]
     blocks = int(np.clip(count / (_BLOCK_PERIODS * period), _FEWEST_BLOCKS, _MOST_BLOCKS))
     share = total / total[-1]
@@ -271,8 +288,8 @@ def _motion(target: Floats, measured: Floats, tracking: Tracking, trusted: Track
         bend=kept[2],
         measured=kept[3],
         amplitude=amplitude[inside],
-        by_frequency=tuple(kept[4:]),
-        signs=tuple(signs[:, inside]),
+        by_frequency=tuple(kept[4:8]),
+        signs=tuple(kept[8:]),
         starts=np.linspace(0, count, blocks, endpoint=False).astype(np.intp),
         delay_s=delay_s,
         f_eq=f_eq,
@@ -489,7 +506,10 @@ def dependence(
     constant = _solve(shape[:2], motion.measured, motion.starts).squares
     everything = _solve(np.concatenate((shape, signs, over_time, by_frequency)), motion.measured, motion.starts).squares
     least = min(everything, *(fit.squares for fit in fits.values()))
-    if not constant > least:
+    # What the least change that counts would leave, were it in this part of the motion only.
+    delay = max(_LEAST_DELAY * abs(motion.delay_s), _LEAST_SAMPLE / trusted.rate_hz)
+    change = float(trusted.amplitude) * min(_LEAST_GAIN, 2 * math.pi * motion.f_eq * delay)
+    if not constant - least > _PART * change**2 * float(motion.target @ motion.target):
         return None
     shares = {name: max(0.0, (constant - fit.squares) / (constant - least)) for name, fit in fits.items()}
     order = sorted(("frequency", "amplitude", "drift", "step"), key=lambda name: -shares[name])
@@ -503,27 +523,25 @@ def dependence(
             continue
         if fits[name].odds(2) * (_PLACES if name == "step" else 1.0) > _CHANCE:
             continue
-        found, levels = _told(motion, name, fits, told, place, response)
-        if _matters(levels, trusted.rate_hz):
+        found, levels = _told(motion, name, fits, told, place, trusted.rate_hz, response)
+        if any(_matters(pair, trusted.rate_hz, _SOUGHT if name == "step" else 1.0) for pair in levels):
             return found
     return None
 
 
-def _size(levels: tuple[Level, Level]) -> float:
-    """The larger of both changes, each over what would be no finding."""
+def _matters(levels: tuple[Level, Level], rate_hz: float, sure: float = 1.0) -> bool:
+    """Whether delay or gain change by enough to be told, and by more than they are known to."""
     first, second = levels
-    return max(
-        abs(second.delay_s / first.delay_s - 1) / _LEAST_DELAY if first.delay_s else math.inf,
-        abs(second.gain / first.gain - 1) / _LEAST_GAIN if first.gain else math.inf,
-    )
-
-
-def _matters(levels: tuple[Level, Level], rate_hz: float) -> bool:
-    first, second = levels
-    delay, gain = abs(second.delay_s - first.delay_s), abs(second.gain - first.gain)
-    return delay > max(_LEAST_DELAY * abs(first.delay_s), _LEAST_SAMPLE / rate_hz) or gain > _LEAST_GAIN * abs(
-        first.gain
-    )
+    for low, high, least in (
+        ((first.delay_s, *first.delay_interval_s), (second.delay_s, *second.delay_interval_s),
+         max(_LEAST_DELAY * abs(first.delay_s), _LEAST_SAMPLE / rate_hz)),
+        ((first.gain, *first.gain_interval), (second.gain, *second.gain_interval), _LEAST_GAIN * abs(first.gain)),
+    ):  # fmt: skip
+        # Half the width of the difference's interval; NaN is no finding.
+        half = math.hypot(low[2] - low[1], high[2] - high[1]) / 2
+        if abs(high[0] - low[0]) > max(least, sure * _SURE * half) and math.isfinite(half):
+            return True
+    return False
 
 
 def _told(
@@ -532,9 +550,10 @@ def _told(
     fits: Mapping[str, _Fit],
     shares: Mapping[str, float],
     place: int,
+    rate_hz: float,
     response: FrequencyResponse | None,
-) -> tuple[Dependence, tuple[Level, Level]]:
-    """The figures of one cause, and the levels by which to judge whether it matters."""
+) -> tuple[Dependence, list[tuple[Level, Level]]]:
+    """The figures of one cause, and pairs of levels, any of which may show that it matters."""
     start, end = float(motion.time_s[0]), float(motion.time_s[-1])
     fit = fits[name]
     if name == "frequency":
@@ -543,13 +562,13 @@ def _told(
         levels = _by_fit(motion, fit)
         shown = _octaves(motion)
         # The octaves are what the record shows; they are told where they show it, too.
-        if shown is not None and _size(shown) > min(_SHOWN * _size(levels), 1.0):
+        if shown is not None and _matters(shown, rate_hz):
             levels = shown
-        return _found("amplitude", shares, "levels", levels), levels
+        return _found("amplitude", shares, "levels", levels), [levels]
     if name == "step":
         at = float(motion.time_s[place])
         levels = (_along(motion, fit, (0.0,), (start, at)), _along(motion, fit, (1.0,), (at, end)))
-        return _found("time", shares, "step", levels, step_s=at), levels
+        return _found("time", shares, "step", levels, step_s=at), [levels]
     even = abs(2 * fit.coefficients[2] / fit.coefficients[0]) < _CLOCK_GAIN
     if even and shares["clock"] > _CLOCK_SHARE * shares["time"]:
         clock = fits["clock"]
@@ -561,9 +580,9 @@ def _told(
         ppm, std = rate * float(clock.coefficients[2]), rate * clock.std(np.array((0.0, 0.0, 1.0)))
         t = float(special.stdtrit(max(clock.free, 2), 0.975))
         interval = (ppm - t * std, ppm + t * std)
-        return _found("clock", shares, "line", levels, clock_ppm=ppm, clock_ppm_interval=interval), levels
+        return _found("clock", shares, "line", levels, clock_ppm=ppm, clock_ppm_interval=interval), [levels]
     levels = (_along(motion, fit, (-1.0,), (start, start)), _along(motion, fit, (1.0,), (end, end)))
-    return _found("time", shares, "line", levels), levels
+    return _found("time", shares, "line", levels), [levels]
 
 
 def _found(
@@ -588,7 +607,7 @@ def _found(
 
 def _over_frequency(
     motion: _Motion, fit: _Fit, shares: Mapping[str, float], response: FrequencyResponse | None
-) -> tuple[Dependence, tuple[Level, Level]]:
+) -> tuple[Dependence, list[tuple[Level, Level]]]:
     """Delay and gain at both ends of the band that holds nine tenths of the energy, and the lines between."""
     low, high = motion.middle_hz
     c = fit.coefficients
@@ -608,14 +627,14 @@ def _over_frequency(
 
     ends = (at(low), at(high))
     if response is None:
-        return _found("frequency", shares, "line", ends), ends
+        return _found("frequency", shares, "line", ends), [ends]
     # Two numbers bend little; the curve says what is at the ends, where it is known there.
     told = (_of_curve(response, low) or ends[0], _of_curve(response, high) or ends[1])
     lines = {
         "delay_line": _line(response, response.delay_s, response.delay_std_s, motion),
         "gain_line": _line(response, response.gain, response.gain_std, motion),
     }
-    return _found("frequency", shares, "line", told, **lines), ends
+    return _found("frequency", shares, "line", told, **lines), [ends, told]
 
 
 def _of_curve(response: FrequencyResponse, frequency_hz: float) -> Level | None:
