@@ -18,12 +18,15 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+sys.path.insert(0, str(Path(__file__).resolve().parent))
 import rthstrack
+from accuracy import Row
 from rthstrack.reproduction.cases import linear, nonlinear
 
 Floats = NDArray[np.float64]
@@ -438,37 +441,101 @@ def named(pair: Pair) -> tuple[str, str]:
     return found.depends_on or NO_CAUSE, found.argument
 
 
+@dataclass(frozen=True)
+class Tally:
+    name: str
+    asked: float  # share that must be right; NaN where it is only reported
+    right: int
+    total: int
+    said: Counter[str]
+    seconds: float
+
+
+def sources(runs: int, noise: float, seed: int) -> dict[str, tuple[float, Callable[[], Iterator[Pair]]]]:
+    found: dict[str, tuple[float, Callable[[], Iterator[Pair]]]] = {
+        kind: (0.9, lambda kind=kind: single(kind, runs, noise, seed))  # type: ignore[misc]
+        for kind in KINDS
+    }
+    found["two at once, the larger"] = (0.9, lambda: two(runs, noise, seed))
+    found["constant"] = (0.98, lambda: unchanging(runs, noise, seed))
+    found["constant, no noise"] = (0.98, lambda: unchanging(runs, 0.0, seed))
+    found["constant, 3 % of noise on both"] = (0.98, lambda: unchanging(runs, 0.03, seed, 0.03))
+    found["virtual tests of constant gain and delay"] = (0.98, lambda: rehearsed(noise))
+    return found
+
+
+def tally(name: str, asked: float, source: Callable[[], Iterator[Pair]], show: bool = False) -> Tally:
+    said: Counter[str] = Counter()
+    right = 0
+    begun = time.perf_counter()
+    for pair in source():
+        kind, argument = named(pair)
+        said[kind] += 1
+        right += kind == pair.kind
+        if show and kind != pair.kind:
+            print(f"  {kind} for {pair.kind}, {100 * pair.change:.0f} %; {pair.what}\n     {argument}")
+    return Tally(name, asked, right, said.total(), said, time.perf_counter() - begun)
+
+
+@cache
+def _full() -> tuple[Tally, ...]:
+    return tuple(tally(name, *source) for name, source in sources(100, 0.01, 0).items())
+
+
+def rows() -> list[Row]:
+    """Rows of the first table of docs/accuracy.md."""
+    return [
+        Row(
+            f"what delay and gain depend on, noise of 1 %: {t.name}"
+            if "noise" not in t.name
+            else f"the same: {t.name}",
+            f"right in >= {100 * t.asked:.0f} %",
+            f"{100 * t.right / t.total:.0f} % of {t.total}",
+            t.right >= t.asked * t.total,
+            t.right / t.total,
+        )
+        for t in _full()
+    ]
+
+
+def section() -> str:
+    """The section of docs/accuracy.md, in Markdown."""
+    kinds = [*KINDS, NO_CAUSE]
+    lines = [
+        "## What delay and gain depend on",
+        "",
+        f"{len(motions())} motions: earthquake responses of one and two modes, random motion, bursts, sweeps.",
+        "First and second order, dead band, play and friction, steps and drifts of delay and gain, clocks 40 to 200 ppm",
+        "apart; in each pair delay or gain varies by more than a tenth. How often which was named:",
+        "",
+        "| made | " + " | ".join(kinds) + " |",
+        "| --- |" + " ---: |" * len(kinds),
+        *(f"| {t.name} | " + " | ".join(str(t.said[kind]) for kind in kinds) + " |" for t in _full()),
+        "",
+        "On a sweep one way frequency and time are one thing, and frequency is named; where amplitude goes with",
+        "frequency, likewise; neither is asked about.",
+        "A delay that grows evenly at a constant gain is called a clock's, whatever made it so.",
+        "",
+    ]
+    return "\n".join(lines)
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description="Rates at which the right cause is named.")
     parser.add_argument("--runs", type=int, default=100)
     parser.add_argument("--noise", type=float, default=0.01)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--only", nargs="+", default=[])
+    parser.add_argument("--only", nargs="+", default=[], help="first words of the cases")
     parser.add_argument("--show", action="store_true", help="print what was named wrongly")
     options = parser.parse_args()
-    sources: dict[str, Callable[[], Iterator[Pair]]] = {
-        name: lambda name=name: single(name, options.runs, options.noise, options.seed) for name in KINDS
-    }
-    sources["two"] = lambda: two(options.runs, options.noise, options.seed)
-    sources["constant"] = lambda: unchanging(options.runs, options.noise, options.seed)
-    sources["constant, clean"] = lambda: unchanging(options.runs, 0.0, options.seed)
-    sources["constant, 3 % on both"] = lambda: unchanging(options.runs, 0.03, options.seed, 0.03)
-    sources["rehearsed"] = lambda: rehearsed(options.noise)
-    for name, source in sources.items():
-        if options.only and name.split(",")[0] not in options.only and name not in options.only:
+    for name, (asked, source) in sources(options.runs, options.noise, options.seed).items():
+        if options.only and name.split()[0].strip(",") not in options.only:
             continue
-        said: Counter[str] = Counter()
-        right = total = 0
-        started = time.perf_counter()
-        for pair in source():
-            kind, argument = named(pair)
-            said[kind] += 1
-            total += 1
-            right += kind == pair.kind
-            if options.show and kind != pair.kind:
-                print(f"  {kind} for {pair.kind}, {100 * pair.change:.0f} %; {pair.what}\n     {argument}")
-        took = time.perf_counter() - started
-        print(f"{name}: {right} of {total} right; said {dict(said.most_common())} ({took:.0f} s)", flush=True)
+        t = tally(name, asked, source, options.show)
+        mark = "met" if t.right >= asked * t.total else "MISSED"
+        print(
+            f"{mark}: {name}: {t.right} of {t.total}; said {dict(t.said.most_common())} ({t.seconds:.0f} s)", flush=True
+        )
     return 0
 
 
