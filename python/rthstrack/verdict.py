@@ -204,7 +204,8 @@ def argument(
     if depends is None or depends.kind == "frequency":
         slowly = _varying_slowly(slopes)
     else:
-        slowly = f"; {_in_words(depends, unit, start_s, _MINOR_CHANGE)}"
+        said = _in_words(depends, unit, start_s, _MINOR_CHANGE)
+        slowly = f"; {said}" if said else ""
     if tracking is trusted:
         interval = "with its interval" if not trusted.reason else f"for which there is {trusted.reason}"
         return f"this is the trusted estimate, {interval}{slowly}", None
