@@ -41,8 +41,9 @@ _MOVED = 3e-4
 _LEAST_DELAY, _LEAST_GAIN, _LEAST_SAMPLE = 0.07, 0.03, 0.05
 # Nor are changes in less than this share of the motion's energy.
 _PART = 0.005
-# Nor are those within so many half intervals of the difference; more where the place of the change was sought.
-_SURE, _SOUGHT = 1.2, 1.6
+# Nor are those within so many half intervals of the difference; more where the place of the change was sought,
+# less over amplitude, whose levels the other causes make scatter.
+_SURE, _SURER = 1.2, {"step": 1.6, "amplitude": 0.8}
 # Probability of a false finding by noise; the place of a step is sought, which gives noise so many chances.
 _CHANCE, _PLACES = 1e-3, 30.0
 # Noise is taken to be independent from block to block: so many periods each, and between so many blocks in all.
@@ -64,8 +65,9 @@ _KNOWN, _CLEAR, _FEW = 0.2, 10.0, 20
 _ENERGY_ENDS = (0.05, 0.95)
 # What does not matter gives way to the next cause, where that explains at least so much of what it does.
 _NEXT = 0.5
-# A line over frequency fits where the curve departs from it by no more than this share of delay or gain.
-_STRAIGHT = 0.05
+# A line over frequency fits where the curve departs from it by no more than this share of delay or gain; by noise, by
+# no more than the second.
+_STRAIGHT, _ROUGH = 0.05, 0.12
 # A bin no farther than this share of the frequency stands for it.
 _NEAR = 0.5
 
@@ -504,7 +506,14 @@ def dependence(
         "clock": _varying(motion, [clock_time], gains=False),
     }
     constant = _solve(shape[:2], motion.measured, motion.starts).squares
-    everything = _solve(np.concatenate((shape, signs, over_time, by_frequency)), motion.measured, motion.starts).squares
+    families = {"frequency": by_frequency, "amplitude": np.concatenate((shape[2:], signs)), "time": over_time}
+
+    def left(*names: str) -> float:
+        """What all causes leave together, but for some."""
+        x = np.concatenate((shape[:2], *(rows for name, rows in families.items() if name not in names)))
+        return _solve(x, motion.measured, motion.starts).squares
+
+    everything = left()
     least = min(everything, *(fit.squares for fit in fits.values()))
     # What the least change that counts would leave, were it in this part of the motion only.
     delay = max(_LEAST_DELAY * abs(motion.delay_s), _LEAST_SAMPLE / trusted.rate_hz)
@@ -512,19 +521,23 @@ def dependence(
     if not constant - least > _PART * change**2 * float(motion.target @ motion.target):
         return None
     shares = {name: max(0.0, (constant - fit.squares) / (constant - least)) for name, fit in fits.items()}
-    order = sorted(("frequency", "amplitude", "drift", "step"), key=lambda name: -shares[name])
-    if shares["frequency"] > shares[order[0]] - _TIE:
+    # Causes overlap: what counts is the mean of what each takes off alone and what it takes off last.
+    last = {name: max(0.0, (left(name) - everything) / (constant - least)) for name in families}
+    last["drift"] = last["step"] = last["time"]
+    weight = {name: (shares[name] + last[name]) / 2 for name in ("frequency", "amplitude", "drift", "step")}
+    order = sorted(weight, key=lambda name: -weight[name])
+    if shares["frequency"] > max(shares[name] for name in weight) - _TIE:
         order.remove("frequency")
         order.insert(0, "frequency")
     told = {name: shares[name] for name in ("frequency", "amplitude", "clock")}
     told["time"] = max(shares["drift"], shares["step"])
     for name in order:
-        if shares[name] < _NEXT * shares[order[0]]:
+        if weight[name] < _NEXT * weight[order[0]]:
             continue
         if fits[name].odds(2) * (_PLACES if name == "step" else 1.0) > _CHANCE:
             continue
         found, levels = _told(motion, name, fits, told, place, trusted.rate_hz, response)
-        if any(_matters(pair, trusted.rate_hz, _SOUGHT if name == "step" else 1.0) for pair in levels):
+        if any(_matters(pair, trusted.rate_hz, _SURER.get(name, 1.0)) for pair in levels):
             return found
     return None
 
@@ -662,8 +675,8 @@ def _line(response: FrequencyResponse, values: Floats, std: Floats, motion: _Mot
         centred = x - x.mean()
         slope = float(centred @ y / (centred @ centred))
         rest = y - y.mean() - slope * centred
-        worst = float(np.abs(rest).max())
-        if worst <= max(_STRAIGHT * abs(float(y.mean())), 3 * float(np.median(s))):
+        worst, level = float(np.abs(rest).max()), max(abs(float(y.mean())), 1e-12)
+        if worst <= min(max(_STRAIGHT, 3 * float(np.median(s)) / level), _ROUGH) * level:
             at = min(max(motion.f_eq, float(x[0])), float(x[-1]))
             error = math.sqrt(float((centred**2) @ (s**2))) / float(centred @ centred)
             return Line(
