@@ -870,7 +870,7 @@ SECTIONS: tuple[Callable[[Run], None], ...] = (
     large_delays,
     machine,
 )
-SIBLINGS = ("accuracy_factors", "accuracy_response", "accuracy_hostile")
+SIBLINGS = ("accuracy_factors", "accuracy_response", "accuracy_hostile", "causes")
 
 
 def computed(

@@ -19,7 +19,7 @@ KEYS = {
     "file", "actuator", "target", "measured", "unit", "rate_hz", "n_samples", "amplitude", "delay_s", "phase_rad",
     "equivalent_frequency_hz", "n_bins", "delta_f_hz", "settings", "indices", "warnings", "amplitude_std",
     "amplitude_interval", "delay_std_s", "delay_interval_s", "residual_coherence", "goodness", "reason", "trusted",
-    "slopes", "argument",
+    "slopes", "depends_on", "dependence", "argument",
 }  # fmt: skip
 TRUSTED = {
     "estimator", "amplitude", "amplitude_interval", "delay_s", "delay_interval_s", "target_noise_std", "reason",

@@ -155,17 +155,16 @@ def test_the_cause_of_a_difference_is_named_and_removing_it_is_shown_to_help(
 
 def test_a_delay_that_varies_is_told_with_its_slope_instead_of_one_number() -> None:
     found = assessed(broad(), broad(filtered=first_order))
-    assert found.slopes is not None
-    low, high = sorted(1e3 * abs(end) for end in found.slopes.delay_s_per_hz_interval)
     assert found.argument.startswith("the delay is not one number: ")
     assert "falling by" in found.argument
     told = [
         float(word.strip("();,")) for word in found.argument.split() if word.strip("();,").replace(".", "").isdigit()
     ]
-    f_eq = found.slopes.equivalent_frequency_hz
-    assert told[0] == pytest.approx(1e3 * math.atan(f_eq / 5) / (2 * math.pi * f_eq), abs=0.5)
-    assert any(number == pytest.approx(low, rel=1e-4) for number in told)
-    assert any(number == pytest.approx(high, rel=1e-4) for number in told)
+    # The line as told departs from the actuator's own curve by no more than it says, its two ends included.
+    value, at, slope, _, _, low, high, misfit = told[:8]
+    f = np.linspace(low, high, 101)
+    away = np.abs(value - slope * (f - at) - 1e3 * np.arctan(f / 5) / (2 * np.pi * f))
+    assert away.max() < misfit + 0.1
     assert not any("not one number" in warning for warning in found.warnings)
 
 

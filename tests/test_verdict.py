@@ -84,7 +84,7 @@ def test_detrending_takes_the_warning_of_an_offset_away() -> None:
         (0.0132, 1.018, "measured lags target by 13.2 ms and is 1.8 % too large, judged at 1 Hz"),
         (-0.005, 0.5, "measured leads target by 5 ms and is 50 % too small, judged at 1 Hz"),
         (0.0, 1.0, "measured is in time with target and has the right amplitude, judged at 1 Hz"),
-        (0.1, 3.0, "measured lags target by 100 ms and is 3 times too large, judged at 1 Hz"),
+        (0.1, 3.0, "measured lags target by 100 ms and is 3 times as large, judged at 1 Hz"),
     ],
 )
 def test_the_sentence_says_which_way_and_how_much(delay_s: float, amplitude: float, expected: str) -> None:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rthstrack import verdict as words
+from rthstrack.dependence import Dependence, dependence
 from rthstrack.display import signal_roles
 from rthstrack.errors import SettingError, SignalError
 from rthstrack.factors import TOLERANCE, Factors, choose_factors
@@ -86,6 +87,8 @@ class Assessment:
     response_note: str | None
     slopes: FrequencySlopes | None
     slopes_note: str | None
+    depends_on: str | None
+    dependence: Dependence | None
     indices: Indices
     histories: IndexHistories
     settings: dict[str, Any]
@@ -137,6 +140,9 @@ def assess(
     factors = _chosen(t, m, rate_hz, settings, choose, tolerance) if choose else None
     for_record = settings if factors is None else factors.settings
     tracking = Evaluator(max(t.size, 1), rate_hz, for_record).evaluate(t, m, weights=True)
+    still = words.still_in_band(t, tracking)
+    if still is not None:
+        tracking = _without_numbers(tracking, still)
     for_windows = tracking.settings if factors is None else factors.reference.settings
     asked = moving_s is not None or hop_s is not None
     window_s = min(MOVING_S, t.size / rate_hz / 4) if moving_s is None else moving_s
@@ -145,6 +151,8 @@ def assess(
     trusted = tracking
     if tracking.settings != trusted_settings:
         trusted = Evaluator(t.size, rate_hz, trusted_settings).evaluate(t, m)
+        if still is not None:
+            trusted = _without_numbers(trusted, still)
     moving, trusted_moving, moving_note = None, None, None
     try:
         moving = _moving(t, m, rate_hz, window_s, hop_s, for_windows)
@@ -165,12 +173,20 @@ def assess(
     except (SettingError, SignalError) as error:
         slopes_note = f"not determined: {error}"
     response, response_note = _response(t, m, rate_hz, slopes, trusted)
-    variants = _variants(t, m, tracking, trusted_settings, slopes) if words.differ(tracking, trusted) else {}
+    depends = dependence(t, m, tracking, trusted, response)
+    same, trusted = tracking is trusted, words.with_cause(trusted, depends)
+    if same:
+        tracking = trusted
     limits = limits or Limits()
     names = (target_name, measured_name)
     units = (unit, measured_unit or unit)
-    warnings = words.warnings(t, m, tracking, trusted, moving, response, units, names)
-    argument, said = words.argument(t, tracking, trusted, trusted_moving, slopes, variants, warnings)
+    found_indices = indices(t, m, rate_hz)
+    warnings = words.warnings(
+        t, m, tracking, trusted, moving, response, found_indices.rms_error_percent, depends, units, names
+    )
+    suspect = "mean" if "offset" in warnings and "drift" not in warnings else "linear"
+    variants = _variants(t, m, tracking, trusted_settings, slopes, suspect) if words.differ(tracking, trusted) else {}
+    argument, said = words.argument(t, tracking, trusted, depends, slopes, variants, warnings, unit, start_s)
     evaluation = dataclasses.asdict(tracking.settings) | _factor_settings(factors)
     evaluation["expected_delay_s"] = trusted_settings.expected_delay_s
     return Assessment(
@@ -194,7 +210,9 @@ def assess(
         response_note=response_note,
         slopes=slopes,
         slopes_note=slopes_note,
-        indices=indices(t, m, rate_hz),
+        depends_on=None if depends is None else depends.kind,
+        dependence=depends,
+        indices=found_indices,
         histories=index_histories(t, m, rate_hz),
         settings=evaluation | {"moving_s": window_s, "hop_s": hop_s} | dict(origin or {}),
         verdict=words.sentence(tracking, *signal_roles(part)),
@@ -207,6 +225,14 @@ def assess(
         exceeded=words.exceeded(tracking, limits),
         factors=factors,
     )
+
+
+def _without_numbers(tracking: Tracking, why: str) -> Tracking:
+    """The same without gain and delay, for a reason that the estimate itself did not see."""
+    names = ("amplitude", "phase_rad", "delay_s", "amplitude_std", "delay_std_s")
+    nothing: dict[str, Any] = dict.fromkeys(names, math.nan)
+    interval = (math.nan, math.nan)
+    return dataclasses.replace(tracking, **nothing, amplitude_interval=interval, delay_interval_s=interval, reason=why)
 
 
 def without_trusted(settings: Settings) -> Settings:
@@ -269,6 +295,7 @@ def _variants(
     tracking: Tracking,
     trusted: Settings,
     slopes: FrequencySlopes | None,
+    detrend: str,
 ) -> dict[str, Tracking]:
     """The evaluation with one thing changed, each a suspect where it and the trusted estimate differ."""
     settings = tracking.settings
@@ -282,8 +309,8 @@ def _variants(
             "expected_delay_s": trusted.expected_delay_s,
         },
     }
-    if settings.detrend != "linear":
-        changes["detrend"] = {"detrend": "linear"}
+    if settings.detrend == "none" or (settings.detrend == "mean" and detrend == "linear"):
+        changes["detrend"] = {"detrend": detrend}
     if slopes is not None:
         low, high = settings.band_hz or (0.0, math.inf)
         changes["band"] = {"band_hz": (low, min(high, slopes.band_hz[1]))}
@@ -361,6 +388,8 @@ def result_entry(a: Assessment) -> dict[str, Any]:
         "reason": words.reason(t),
         "trusted": _trusted_entry(a.trusted),
         "slopes": _slopes_entry(a.slopes, a.slopes_note),
+        "depends_on": a.depends_on,
+        "dependence": None if a.dependence is None else a.dependence.to_dict(),
         "settings": a.settings,
         "indices": {
             "max_tracking_error": i.max_tracking_error,

@@ -5,7 +5,9 @@ Everything here reads results; nothing changes them. The thresholds stand at the
 
 from __future__ import annotations
 
+import dataclasses
 import math
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rthstrack.assessment import Limits
+    from rthstrack.dependence import Dependence, Level, Line
     from rthstrack.tracking import FrequencyResponse, FrequencySlopes, MovingTracking, Tracking
 
 # An amplitude this near to one is called right: no displacement sensor of a test rig is better.
@@ -58,16 +61,12 @@ _EXPLAINED, _FORETOLD = 0.5, 0.2
 _MINOR = 0.25
 # A bin that holds so many times what noise leaves in it on average holds motion.
 _CLEAR_OF_NOISE = 16.0
-# A number that changes by more than this share over the frequencies of the energy is quoted with its slope only.
-_MISLEADING = 0.1
 # Ends this near to the mean, in standard deviations, are no cause.
-_AT_MEAN = 0.05
-# Over time: the middle eight tenths of the windows differ by this share, and by this many of their own half intervals.
-_UNSTEADY, _UNSTEADY_INTERVALS, _STEADY_WINDOWS = 0.1, 3.0, 4
-# Windows one length apart differ by this much less than if they had nothing to do with each other.
-_GRADUAL = 0.5
-# Share of the changes over time that follow the motion's frequency, from which they are left to it.
-_BY_FREQUENCY = 0.5
+_AT_MEAN = 0.1
+# A target is still in a band that holds less than this share of its motion, the step of a converter of 20 bits.
+_STILL = 1e-6
+# An offset of measured is told from this share of target's deviation on.
+_STANDS_OFF = 0.25
 
 
 def sentence(tracking: Tracking, target: str = "target", measured: str = "measured") -> str:
@@ -85,7 +84,7 @@ def sentence(tracking: Tracking, target: str = "target", measured: str = "measur
     if abs(amplitude - 1) < _RIGHT_AMPLITUDE:
         size = "has the right amplitude"
     elif amplitude > 2:
-        size = f"is {amplitude:.3g} times too large"
+        size = f"is {amplitude:.3g} times as large"
     else:
         size = f"is {_percent(abs(excess))} % too {'large' if excess > 0 else 'small'}"
     return f"{timing} and {size}, judged at {float(tracking.equivalent_frequency_hz):.2g} Hz"
@@ -96,9 +95,44 @@ _NO_MOTION = "measured does not move"
 
 def reason(tracking: Tracking) -> str | None:
     """Why a number or its interval is missing; None where nothing is, and for the published estimator's intervals."""
-    if not tracking.reason and math.isnan(float(tracking.delay_s)):
+    said = str(tracking.reason)
+    if not said and math.isnan(float(tracking.delay_s)):
         return f"not determined: {_NO_MOTION}"
-    return str(tracking.reason) or None
+    # So wide that the number means nothing but that.
+    uncertain = _UNCERTAIN.search(said)
+    if uncertain and float(uncertain[1]) > 1e3 * tracking.n_samples / tracking.rate_hz:
+        said = said.replace(uncertain[0], "noise hides the delay altogether")
+    return said or None
+
+
+def with_cause(tracking: Tracking, depends: Dependence | None) -> Tracking:
+    """The same, its reason with the cause that was found: what noise on target leaves follows target, too."""
+    said = str(tracking.reason)
+    if _NOT_CONSTANT not in said:
+        return tracking
+    if depends is not None:
+        over = {"amplitude": "amplitude", "frequency": "frequency"}.get(depends.kind, "time")
+        said = said.replace("over frequency or time", f"over {over}")
+    elif float(tracking.target_noise_std) > 0:
+        said = said.replace(_NOT_CONSTANT, ", as noise on target does")
+    return dataclasses.replace(tracking, reason=said)
+
+
+_NOT_CONSTANT = ", so they are not constant over frequency or time"
+_UNCERTAIN = re.compile(r"noise leaves the delay uncertain by ([\d.]+) ms either way, more than half a turn")
+
+
+def still_in_band(target: NDArray[np.float64], tracking: Tracking) -> str | None:
+    """That target does not move in the band asked for: then gain and delay there are rounding's. Needs the spectra."""
+    band, spectrum = tracking.settings.band_hz, tracking.target_spectrum
+    if band is None or spectrum is None:
+        return None
+    # By Parseval, and the bins that Q leaves out like their neighbours.
+    n = tracking.rate_hz / tracking.delta_f_hz * tracking.settings.frequency_decimation
+    squares = 2 * tracking.settings.frequency_decimation * float(np.sum(np.abs(spectrum) ** 2)) / n
+    if squares > (_STILL * float(target.std())) ** 2 * target.size:
+        return None
+    return f"not determined: target does not move between {band[0]:.3g} and {band[1]:.3g} Hz"
 
 
 def _undetermined(tracking: Tracking) -> str | None:
@@ -146,14 +180,17 @@ def argument(
     target: NDArray[np.float64],
     tracking: Tracking,
     trusted: Tracking,
-    trusted_moving: MovingTracking | None,
+    depends: Dependence | None,
     slopes: FrequencySlopes | None,
     variants: Mapping[str, Tracking],
     found: Mapping[str, str],
+    unit: str | None = None,
+    start_s: float = 0.0,
 ) -> tuple[str, str | None]:
     """In one sentence, which number to use and why; and the name of that warning of `found` which it says itself.
 
-    `tracking` is the estimate asked for, with weights; `variants` are the same with one setting changed.
+    `tracking` is the estimate asked for, with weights; `variants` are the same with one setting changed. `unit` is
+    target's; `start_s` the time of the first sample.
     """
     if (missing := _undetermined(trusted)) is not None:
         said = "no number can be trusted here" if _undetermined(tracking) is None else "there is no number to use"
@@ -161,15 +198,14 @@ def argument(
     if (missing := _undetermined(tracking)) is not None:
         asked_for = _NAMES[tracking.settings.estimator]
         return f"use the trusted estimate: {asked_for} is not determined: {missing}", None
-    # Foreign motion in measured comes and goes; it is not the actuator that changes.
-    if "coherence" not in found and (unsteady := _unsteady(trusted_moving)) is not None:
-        name, text = unsteady
-        return f"{text}; {_averages(tracking, trusted, name)}", None
-    if slopes is not None and slopes.delay_varies and _change(slopes, "delay") > _MISLEADING:
-        return f"{_varying_delay(slopes)}; {_averages(tracking, trusted)}", "delay spread"
-    if slopes is not None and slopes.gain_varies and _change(slopes, "gain") > _MISLEADING:
-        return f"{_varying_gain(slopes)}; {_averages(tracking, trusted, 'amplitude')}", None
-    slowly = _varying_slowly(slopes)
+    if depends is not None and (varying := _varying(depends, unit, start_s)) is not None:
+        name, text = varying
+        return f"{text}; {_averages(tracking, trusted, name)}", "delay spread"
+    if depends is None or depends.kind == "frequency":
+        slowly = _varying_slowly(slopes)
+    else:
+        said = _in_words(depends, unit, start_s, _MINOR_CHANGE)
+        slowly = f"; {said}" if said else ""
     if tracking is trusted:
         interval = "with its interval" if not trusted.reason else f"for which there is {trusted.reason}"
         return f"this is the trusted estimate, {interval}{slowly}", None
@@ -250,15 +286,6 @@ def _line(value: float, interval: tuple[float, float], factor: float, what: str)
     return f"{'rising' if value > 0 else 'falling'} by {number}{what} a hertz {between}".rstrip()
 
 
-def _change(s: FrequencySlopes, what: str) -> float:
-    """How much gain or delay change over the band, by slope and bend, as a share of themselves."""
-    value, slope, misfit = (
-        (s.gain, s.gain_per_hz, s.gain_misfit) if what == "gain" else (s.delay_s, s.delay_s_per_hz, s.delay_misfit_s)
-    )
-    change = abs(slope) * (s.band_hz[1] - s.band_hz[0]) + 2 * misfit
-    return change / abs(value) if value else math.inf
-
-
 def _varying_slowly(s: FrequencySlopes | None) -> str:
     """What is added to a number that changes with frequency, but by too little to mislead."""
     if s is None:
@@ -271,59 +298,82 @@ def _varying_slowly(s: FrequencySlopes | None) -> str:
     return f"; {' and '.join(changes)}" if changes else ""
 
 
-def _varying_delay(s: FrequencySlopes) -> str:
-    value = _value(1e3 * s.delay_s, 1e3 * s.delay_std_s, 1e3 * s.delay_misfit_s)
-    slope = _line(s.delay_s_per_hz, s.delay_s_per_hz_interval, 1e3, " ms")
-    return (
-        f"the delay is not one number: {value} ms at {s.equivalent_frequency_hz:.2g} Hz, {slope} "
-        f"from {s.band_hz[0]:.2g} to {s.band_hz[1]:.2g} Hz, give or take {1e3 * s.delay_misfit_s:.2g} ms"
+# Changes of delay and gain, as shares of them, that are told: beside one number, or in place of it.
+_MINOR_CHANGE, _MISLEADING = {"delay": 0.07, "gain": 0.03}, {"delay": 0.08, "gain": 0.08}
+
+
+def _varying(d: Dependence, unit: str | None, start_s: float) -> tuple[str, str] | None:
+    """That delay or gain are not one number, in words, and which of them leads; None where they nearly are."""
+    delay, gain = (
+        abs(change) > _MISLEADING[name] for name, change in (("delay", d.delay_change), ("gain", d.gain_change))
     )
-
-
-def _varying_gain(s: FrequencySlopes) -> str:
-    value = _value(s.gain, s.gain_std, s.gain_misfit)
-    slope = _line(s.gain_per_hz, s.gain_per_hz_interval, 1.0, "")
-    return (
-        f"the gain is not one number: {value} at {s.equivalent_frequency_hz:.2g} Hz, {slope} "
-        f"from {s.band_hz[0]:.2g} to {s.band_hz[1]:.2g} Hz, give or take {s.gain_misfit:.2g}"
-    )
-
-
-def _value(value: float, std: float, misfit: float) -> str:
-    """A line's value with the digits that noise, and what the curve departs from the line, leave it."""
-    doubt = max(std, misfit)
-    return with_interval(value, (value - doubt, value + doubt)).partition(" (")[0]
-
-
-def _unsteady(moving: MovingTracking | None) -> tuple[str, str] | None:
-    """Whether delay or amplitude change over time, by the windows that have an interval: which, and in words."""
-    if moving is None:
+    if not (delay or gain):
         return None
-    for name, values, interval, factor, unit in (
-        ("delay_s", moving.delay_s, moving.delay_interval_s, 1e3, " ms"),
-        ("amplitude", moving.amplitude, moving.amplitude_interval, 1.0, ""),
-    ):
-        known = moving.valid & np.isfinite(interval[:, 0])
-        if known.sum() < _STEADY_WINDOWS:
-            return None
-        # Noise on target is in no interval; but it differs from window to window, where an actuator changes gradually.
-        apart = max(1, round(moving.window_s / moving.hop_s))
-        pairs = known[apart:] & known[:-apart]
-        steps = (values[apart:] - values[:-apart])[pairs]
-        if steps.size < _STEADY_WINDOWS or np.mean(steps**2) > _GRADUAL * 2 * np.var(values[known]):
-            continue
-        low, high = (float(end) for end in np.quantile(values[known], (0.1, 0.9)))
-        noise = float(np.median(interval[known, 1] - interval[known, 0])) / 2
-        if high - low > max(_UNSTEADY * abs(float(np.median(values[known]))), _UNSTEADY_INTERVALS * noise):
-            # Where the motion's frequency changes over time, it is the frequency that tells of the actuator.
-            f_eq = moving.equivalent_frequency_hz[known]
-            if np.std(f_eq) > 0 and np.corrcoef(values[known], f_eq)[0, 1] ** 2 > _BY_FREQUENCY:
-                continue
-            span = f"{factor * low:.3g} to {factor * high:.3g}{unit}"
-            what = name.removesuffix("_s")
-            share = f"in 80 % of the windows of {moving.window_s:.3g} s"
-            return name, f"the {what} is not one number: {span} over time, {share}"
-    return None
+    return "delay_s" if delay else "amplitude", _in_words(d, unit, start_s, _MISLEADING)
+
+
+def _in_words(d: Dependence, unit: str | None, start_s: float, least: Mapping[str, float]) -> str:
+    said = []
+    if abs(d.delay_change) > least["delay"]:
+        said.append(f"the delay is not one number: {_course(d, 'delay', unit, start_s)}")
+    if abs(d.gain_change) > least["gain"]:
+        opening = "nor is the gain" if said else "the gain is not one number"
+        said.append(f"{opening}: {_course(d, 'gain', unit, start_s)}")
+    return "; ".join(said)
+
+
+def _course(d: Dependence, what: str, unit: str | None, start_s: float) -> str:
+    """How delay or gain change, with the numbers."""
+    first, second = d.levels
+
+    def at(level: Level, interval: bool = True) -> str:
+        scale, of, ms = (1e3, "delay_s", " ms") if what == "delay" else (1.0, "gain", "")
+        ends = level.delay_interval_s if what == "delay" else level.gain_interval
+        text = with_interval(scale * getattr(level, of), [scale * end for end in ends], ms.strip())
+        return text if interval else text.partition(" (")[0]
+
+    if d.kind == "frequency":
+        line = d.delay_line if what == "delay" else d.gain_line
+        if line is None:
+            return f"{at(first)} at {first.where[0]:.2g} Hz, {at(second)} at {second.where[0]:.2g} Hz"
+        beyond = [
+            f"{at(level, False)} at {level.where[0]:.2g} Hz"
+            for level, end in ((first, line.band_hz[0]), (second, line.band_hz[1]))
+            if (level.where[0] - end) * (1 if level is second else -1) > 0.1 * (line.band_hz[1] - line.band_hz[0])
+        ]
+        return ", and ".join((_along_line(line, what), *beyond))
+    if d.kind == "amplitude":
+        rises = {"delay": ("longer", "shorter"), "gain": ("larger", "smaller")}[what]
+        change = d.delay_change if what == "delay" else d.gain_change
+        low, high = (_amplitudes(level, unit) for level in (first, second))
+        return (
+            f"{at(first)} at {low}; {rises[0 if change > 0 else 1]} where the motion is small: {at(second)} at {high}"
+        )
+    if d.form == "step":
+        assert d.step_s is not None
+        return f"{at(first)} until {start_s + d.step_s:.3g} s and {at(second)} from then on: it changes over time"
+    if d.kind == "clock":
+        assert d.clock_ppm is not None
+        assert d.clock_ppm_interval is not None
+        ppm = with_interval(abs(d.clock_ppm), sorted(abs(end) for end in d.clock_ppm_interval), "ppm")
+        return f"{at(first)} at the start and {at(second)} at the end, evenly over time, as of two clocks {ppm} apart"
+    return f"{at(first)} at the start and {at(second)} at the end: it drifts over time"
+
+
+def _amplitudes(level: Level, unit: str | None) -> str:
+    low, high = level.where
+    in_unit = f" {unit}" if unit else ""
+    return f"{low:.2g} to {high:.2g}{in_unit}" if high > low else f"{low:.2g}{in_unit}"
+
+
+def _along_line(line: Line, what: str) -> str:
+    scale, ms = (1e3, " ms") if what == "delay" else (1.0, "")
+    slope = _line(line.slope_per_hz, line.slope_interval_per_hz, scale, ms)
+    value = with_interval(scale * line.value, [scale * (line.value + side * line.misfit) for side in (-1, 1)])
+    return (
+        f"{value.partition(' (')[0]}{ms} at {line.at_hz:.2g} Hz, {slope} "
+        f"from {line.band_hz[0]:.2g} to {line.band_hz[1]:.2g} Hz, give or take {scale * line.misfit:.2g}{ms}"
+    )
 
 
 def _relative(name: str, tracking: Tracking, trusted: Tracking) -> float:
@@ -358,11 +408,17 @@ def _cause(
         suspects = ["estimator"]
     if not suspects:
         return None, None, "which neither drift, window, noise nor wide phases explain alone"
-    cause = "average" if "average" in suspects else min(suspects, key=remains.__getitem__)
+    # Noise on target that is there, and explains it, needs no help by the record's ends.
+    noisy = "target noise" in found
+    by_bins = "average" in suspects or "band" in suspects
+    if noisy and not by_bins and averaged is not None and abs(ours - averaged[1]) < _EXPLAINED * abs(ours - theirs):
+        return "target noise", None, "as target's own noise counts as motion"
+    first = [name for name in ("average", "band") if name in suspects and (noisy or name == "average")]
+    cause = first[0] if first else min(suspects, key=remains.__getitem__)
     by_noise = 0.0
     if cause == "average" and averaged is not None:
-        clean, noisy = averaged
-        by_noise = (noisy - clean) / (noisy - theirs)
+        clean = averaged[0]
+        by_noise = (averaged[1] - clean) / (averaged[1] - theirs)
         if by_noise > 1 - _MINOR and "band" in suspects:
             cause = "band"  # the same, with a remedy
     if cause == "average":
@@ -396,6 +452,8 @@ def _cause(
     )
     if cause == "window" and window != "boxcar":
         return cause, None, f"as the {window} window acts on different points of both motions: with {remedy} {reading}"
+    if "offset" in found:
+        return cause, "offset", f"as {found['offset']}: with {remedy} {reading}"
     if "drift" in found:
         return cause, "drift", f"as {found['drift'].partition(': try')[0]}: with {remedy} {reading}"
     return cause, None, f"as {_ends_apart(target)}: with {remedy} {reading}"
@@ -483,6 +541,8 @@ def warnings(
     trusted: Tracking,
     moving: MovingTracking | None,
     response: FrequencyResponse | None,
+    rms_error_percent: float,
+    depends: Dependence | None = None,
     units: tuple[str | None, str | None] = (None, None),
     names: tuple[str, str] = ("target", "measured"),
 ) -> dict[str, str]:
@@ -497,11 +557,12 @@ def warnings(
         "amplitude": _odd_amplitude(tracking, units),
         "clipped target": _clipped(target, names[0]),
         "clipped measured": _clipped(measured, names[1]),
+        "offset": _offset(target, measured, trusted, rms_error_percent, units, names),
         "drift": _drift(target, tracking, duration_s),
         "noise": _high_energy(tracking),
         "target noise": _target_noise(target, trusted, names),
         "coherence": _coherence(tracking, response, names),
-        "delay spread": _delay_spread(tracking, trusted, response),
+        "delay spread": _delay_spread(tracking, trusted, response) if _by_frequency(depends) else None,
         "levels": _levels(target, names[0]),
         "quiet": _quiet(moving, names[0]),
     }
@@ -535,6 +596,32 @@ def _odd_amplitude(tracking: Tracking, units: tuple[str | None, str | None]) -> 
     if math.isnan(amplitude) or 1 / _ODD_AMPLITUDE < amplitude < _ODD_AMPLITUDE or units[0] != units[1]:
         return None
     return f"amplitude {amplitude:.3g} is far from 1: are both channels displacements in the same unit? (--scale)"
+
+
+def _by_frequency(depends: Dependence | None) -> bool:
+    return depends is not None and depends.kind == "frequency"
+
+
+def _offset(
+    target: NDArray[np.float64],
+    measured: NDArray[np.float64],
+    trusted: Tracking,
+    rms_error_percent: float,
+    units: tuple[str | None, str | None],
+    names: tuple[str, str],
+) -> str | None:
+    """That measured stands higher or lower than target, by more than gain and delay make it."""
+    if _undetermined(trusted) is not None or units[0] != units[1]:
+        return None
+    off = float(measured.mean()) - float(trusted.amplitude) * float(target.mean())
+    if abs(off) < _STANDS_OFF * float(target.std()):
+        return None
+    unit = f" {units[0]}" if units[0] else ""
+    where = "higher" if off > 0 else "lower"
+    return (
+        f"{names[1]} stands {abs(off):.4g}{unit} {where} than {names[0]}, which makes the rms error "
+        f"{_percent(rms_error_percent)} %"
+    )
 
 
 def _drift(target: NDArray[np.float64], tracking: Tracking, duration_s: float) -> str | None:
@@ -671,6 +758,10 @@ def _levels(target: NDArray[np.float64], name: str) -> str | None:
     if np.unique(target[: 20 * _FEW_LEVELS]).size > _FEW_LEVELS or (n := np.unique(target).size) > _FEW_LEVELS:
         return None
     if target.size < 4 * _FEW_LEVELS:
+        return None
+    steps = np.abs(np.diff(target))
+    # What jumps through most of its range at once is a square wave.
+    if float(np.median(steps[steps > 0])) > 0.5 * float(np.ptp(target)):
         return None
     return f"{name} is small: it takes only {n} distinct values, so quantisation limits what can be said"
 
