@@ -177,7 +177,10 @@ def held(count: int, tell: Callable[[str], None]) -> None:
                 wrong += not ok
                 errors.append(t.delay_s - DELAY_S)
                 if not ok or not abs(errors[-1]) < 2e-4:
-                    tell(f"  held {channel} {every} motion {m}: {t.bad_samples}, error {1e6 * errors[-1]:.1f} us {t.reason[:50]}")
+                    tell(
+                        f"  held {channel} {every} motion {m}: {t.bad_samples},"
+                        f" error {1e6 * errors[-1]:.1f} us {t.reason[:50]}"
+                    )
             tell(
                 f"held, {channel}, every {every}: {cases - wrong} of {cases} told,"
                 f" rms error {1e6 * float(np.sqrt(np.nanmean(np.square(errors)))):.1f} us"
@@ -276,15 +279,20 @@ def innocent(quick: bool) -> Iterator[tuple[str, Floats, Floats, float]]:
     for speed in (0.1, 0.01):
         for level in (0.01, 0.001):
             slow = np.round(speed * t / level) * level
-            yield f"quantised ramp {speed} a second, level {level}", slow, np.round(speed * (t - 0.03) / level) * level, 512.0
+            yield (
+                f"quantised ramp {speed} a second, level {level}",
+                slow,
+                np.round(speed * (t - 0.03) / level) * level,
+                512.0,
+            )
     yield from far_field(2 if quick else 22)
     yield from recordings()
 
 
 def far_field(count: int) -> Iterator[tuple[str, Floats, Floats, float]]:
     from rthstrack import simulate
-    from rthstrack.reproduction.cases import linear, nonlinear
     from rthstrack.ground_motion import record
+    from rthstrack.reproduction.cases import linear, nonlinear
 
     for number in range(1, count + 1):
         for component in "ab":

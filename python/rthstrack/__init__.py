@@ -30,6 +30,7 @@ from rthstrack.recording import Channel, Recording, propose_pair, read_recording
 from rthstrack.report import write_report
 from rthstrack.studies import Study, study
 from rthstrack.tracking import (
+    BadSamples,
     Evaluator,
     FrequencyResponse,
     FrequencySlopes,
@@ -59,6 +60,7 @@ from rthstrack.virtual_test import (
 
 __all__ = [
     "Assessment",
+    "BadSamples",
     "Channel",
     "ChannelError",
     "ConfigurationError",

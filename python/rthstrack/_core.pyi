@@ -16,6 +16,7 @@ __all__ = [
     "Monitor",
     "VirtualTest",
     "__version__",
+    "bridged",
     "causal_decimate",
     "check_test",
     "choose_factors",
@@ -78,6 +79,7 @@ class Monitor:
     def process(self, target: _Array, measured: _Array) -> _Columns: ...
     def restart(self, index: int) -> None: ...
 
+def bridged(target: _Array, measured: _Array, rate_hz: float, settings: Settings) -> tuple[_Array, _Array] | None: ...
 def causal_decimate(samples: _Array, data_decimation: int) -> tuple[_Array, int]: ...
 
 _Whole = NDArray[np.uint64]

@@ -19,8 +19,10 @@ from rthstrack.display import signal_roles
 from rthstrack.errors import SettingError, SignalError
 from rthstrack.factors import TOLERANCE, Factors, choose_factors
 from rthstrack.tracking import (
+    BadSamples,
     Evaluator,
     Settings,
+    bridged,
     evaluate_moving,
     frequency_response,
     frequency_slopes,
@@ -163,6 +165,11 @@ def assess(
         if asked:
             raise type(error)(f"moving windows of {window_s:g} s: {error}") from None
         moving, trusted_moving, moving_note = None, None, f"not determined: {error}"
+    # Curves over frequency and what gain and delay depend on need every sample.
+    raw, without_bad = (t, m), tracking
+    if trusted.bad_samples:
+        t, m = bridged(t, m, rate_hz, trusted.settings)
+        without_bad = Evaluator(t.size, rate_hz, for_record).evaluate(t, m, weights=True)
     slopes, slopes_note = None, None
     # Where one delay explains measured, segments are aligned at it: bursts and drift would lead the search for another.
     explained = math.isfinite(float(trusted.delay_interval_s[0]))
@@ -173,7 +180,8 @@ def assess(
     except (SettingError, SignalError) as error:
         slopes_note = f"not determined: {error}"
     response, response_note = _response(t, m, rate_hz, slopes, trusted)
-    depends = dependence(t, m, tracking, trusted, response)
+    depends = dependence(t, m, without_bad, trusted, response)
+    t, m = raw
     same, trusted = tracking is trusted, words.with_cause(trusted, depends)
     if same:
         tracking = trusted
@@ -186,6 +194,8 @@ def assess(
     )
     suspect = "mean" if "offset" in warnings and "drift" not in warnings else "linear"
     variants = _variants(t, m, tracking, trusted_settings, slopes, suspect) if words.differ(tracking, trusted) else {}
+    if without_bad is not tracking:
+        variants["bad samples"] = without_bad
     argument, said = words.argument(t, tracking, trusted, depends, slopes, variants, warnings, unit, start_s)
     evaluation = dataclasses.asdict(tracking.settings) | _factor_settings(factors)
     evaluation["expected_delay_s"] = trusted_settings.expected_delay_s
@@ -430,6 +440,7 @@ def _trusted_entry(t: Tracking) -> dict[str, Any]:
         "delay_s": t.delay_s,
         "delay_interval_s": _ends(t.delay_interval_s),
         "target_noise_std": t.target_noise_std,
+        "bad_samples": [dataclasses.asdict(bad) for bad in t.bad_samples if isinstance(bad, BadSamples)],
         "reason": words.reason(t),
     }
 

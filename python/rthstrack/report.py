@@ -65,6 +65,7 @@ _SETTING_NAMES = {
     "expected_delay_s": "Expected delay",
     "noise": "Noise on measured",
     "noise_ratio": "Noise on target over that on measured",
+    "bad_samples": "Bad samples",
     "moving_s": "Moving windows",
     "hop_s": "One moving window every",
     "rate_source": "Rate from",

@@ -153,6 +153,7 @@ class StudySettings:
     expected_delay_s: float | None = None
     noise: str = "white"
     noise_ratio: float = 0.0
+    bad_samples: str = "leave_out"
 
     def checked(self) -> StudySettings:
         """The same with the defaults filled in; raises SettingError for what is impossible whatever the source."""
@@ -190,6 +191,7 @@ class StudySettings:
             base.expected_delay_s,
             base.noise,
             base.noise_ratio,
+            base.bad_samples,
         )
         for kind in whole._kinds():
             Evaluator(1024, 1.0, dataclasses.replace(kind, band_hz=None))
@@ -210,6 +212,7 @@ class StudySettings:
             expected_delay_s=self.expected_delay_s,
             noise=self.noise,
             noise_ratio=self.noise_ratio,
+            bad_samples=self.bad_samples,
         )
 
     def _grid(self) -> list[tuple[int, int]]:
@@ -335,6 +338,7 @@ def study(
     expected_delay_s: float | None = None,
     noise: str = "white",
     noise_ratio: float = 0.0,
+    bad_samples: str = "leave_out",
     progress: Callable[[int, int], object] | None = None,
 ) -> Study:
     """Amplitude, delay, their change and error, and computing time over grids of P and Q, windows and weight powers.
@@ -369,6 +373,7 @@ def study(
         expected_delay_s,
         noise,
         noise_ratio,
+        bad_samples,
     ).checked()
     pairs = _pairs(sources, truth)
     grid, kinds = settings._grid(), settings._kinds()

@@ -191,9 +191,10 @@ def _ends(name: str, interval: NDArray[np.float64]) -> dict[str, NDArray[np.floa
 class BadSamples:
     """Samples of one channel that are no motion: their kind and number, and where the first is.
 
-    channel: "target" or "measured". kind: "spike" (one sample that leaves and returns), "dropout" (a stretch of one value
-    to which the signal jumps), "frozen" (a stretch of the last value), "clipped" (peaks cut off), "held" (each value is
-    repeated until the next: `every` samples from one fresh value to the next; else 0). first: index; first_s: seconds.
+    channel: "target" or "measured". kind: "spike" (one sample that leaves and returns), "dropout" (a stretch of one
+    value to which the signal jumps), "frozen" (a stretch of the last value), "clipped" (peaks cut off), "held" (each
+    value is repeated until the next: `every` samples from one fresh value to the next; else 0). first: index; first_s:
+    seconds.
     """
 
     channel: str
@@ -206,7 +207,8 @@ class BadSamples:
 
 def _bad_samples(entries: list[tuple[str, str, int, int, int]], rate_hz: float) -> tuple[BadSamples, ...]:
     return tuple(
-        BadSamples(channel, kind, count, first, first / rate_hz, every) for channel, kind, count, first, every in entries
+        BadSamples(channel, kind, count, first, first / rate_hz, every)
+        for channel, kind, count, first, every in entries
     )
 
 
@@ -224,8 +226,8 @@ class Tracking(_Result):
     the spectrum of what the fit leaves; `residual_coherence`: how far that still follows the target, 0 to 1;
     `goodness`: the share of measured that one gain and one delay explain. All are NaN for "fei", and where not
     determined. `target_noise_std`: standard deviation of the noise that is the target's own, in its unit, where it was
-    taken into account, else 0. `bad_samples`: what was found and left out, for each actuator. `reason` says why there is
-    no number, or no interval, and is empty where nothing is missing.
+    taken into account, else 0. `bad_samples`: what was found and left out, for each actuator. `reason` says why there
+    is no number, or no interval, and is empty where nothing is missing.
     With `weights=True` also, per kept bin (n_bins,) or (n_bins, n_actuators): `frequency_hz` (n_bins,), `weights`
     (sum to one), `target_spectrum` and `measured_spectrum` (complex DFT of the windowed, zero-padded signals).
     """
@@ -262,6 +264,8 @@ class Tracking(_Result):
         for name in _INTERVALS:
             numbers |= _ends(name, np.atleast_2d(np.asarray(getattr(self, name))))
         numbers["reason"] = np.atleast_1d(np.asarray(self.reason, dtype=object))
+        each: Any = self.bad_samples if isinstance(self.reason, tuple) else (self.bad_samples,)
+        numbers["bad_samples_found"] = np.array([bad_words(found) for found in each], dtype=object)
         same = {
             "n_bins": self.n_bins,
             "delta_f_hz": self.delta_f_hz,
@@ -705,6 +709,14 @@ def evaluate_moving(
         reasons = tuple(tuple(r) for r in each)
     columns = (time_s, *averaged, window_s, hop_s, ratio, rate_hz, settings, *precision, bad, reasons)
     return MovingTracking(*columns)
+
+
+def bridged(
+    target: NDArray[np.float64], measured: NDArray[np.float64], rate_hz: float, settings: Settings
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Both signals of one pair with straight lines, or what lies between fresh samples, in place of bad samples."""
+    found = _core.bridged(target, measured, rate_hz, settings)
+    return (target, measured) if found is None else found
 
 
 def frequency_response(

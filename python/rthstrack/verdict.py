@@ -14,6 +14,7 @@ import numpy as np
 
 from rthstrack.display import with_interval
 from rthstrack.readers.units import length_factor
+from rthstrack.tracking import BadSamples
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -167,7 +168,7 @@ def _differences(tracking: Tracking, trusted: Tracking) -> list[str]:
 _ADVICE = {
     "too little motion to judge by": "; are these the right channels?",
     "the iteration did not settle on a delay": "; judge only the frequencies at which target moves (--band)",
-    "measured moves against target; does one of them have the opposite sign?": " (--scale CHANNEL=-1 turns one round)",
+    "measured moves against target": " (--scale CHANNEL=-1 turns one round)",
 }
 _NAMES = {
     "fei": "the published average",
@@ -234,7 +235,7 @@ def _advised(missing: str, trusted: Tracking) -> str:
             most = min(2 * settings.max_delay_s, quarter_s)
             return f"the delay seems to lie beyond max_delay_s, {settings.max_delay_s:g} s: try --max-delay {most:.3g}"
         return f"the delay seems to lie beyond a quarter of the record, {quarter_s:.3g} s: a longer one is needed"
-    return missing + _ADVICE.get(missing, "")
+    return missing + next((advice for known, advice in _ADVICE.items() if missing.startswith(known)), "")
 
 
 def _how_well(tracking: Tracking, trusted: Tracking) -> str:
@@ -400,6 +401,9 @@ def _cause(
         # What averaging makes of a constant gain and delay, target's own noise and all, is taken off.
         readings["average"] = ours - averaged[1] + theirs
     remains = {change: abs(reading - theirs) / abs(ours - theirs) for change, reading in readings.items()}
+    if remains.get("bad samples", 1.0) < _EXPLAINED and "bad samples" in found:
+        # All else that is tried still holds them.
+        return "bad samples", "bad samples", f"as {found['bad samples'].partition('; left out')[0]}"
     suspects = [change for change in ("detrend", "window", "band") if remains.get(change, 1.0) < _EXPLAINED]
     if remains.get("average", 1.0) < _FORETOLD:
         suspects.append("average")
@@ -551,12 +555,15 @@ def warnings(
     `tracking` carries its weights.
     """
     duration_s = tracking.n_samples / tracking.rate_hz
+    # Of these channels what is clipped or held is told already.
+    told = {bad.channel for bad in _of_one(trusted) if bad.kind in ("clipped", "held")}
     found = {
         "units": _unlike_units(units, names),
         "wrap": _wrap(tracking, names),
         "amplitude": _odd_amplitude(tracking, units),
-        "clipped target": _clipped(target, names[0]),
-        "clipped measured": _clipped(measured, names[1]),
+        "bad samples": _bad_samples(trusted, names),
+        "clipped target": _clipped(target, names[0]) if "target" not in told else None,
+        "clipped measured": _clipped(measured, names[1]) if "measured" not in told else None,
         "offset": _offset(target, measured, trusted, rms_error_percent, units, names),
         "drift": _drift(target, tracking, duration_s),
         "noise": _high_energy(tracking),
@@ -723,6 +730,42 @@ def _delay_spread(tracking: Tracking, trusted: Tracking, response: FrequencyResp
         f"the delay is not one number: {1e3 * low:.3g} to {1e3 * high:.3g} ms between {frequency[0]:.2g} and "
         f"{frequency[-1]:.2g} Hz; quote the curve of delay over frequency beside it"
     )
+
+
+def _of_one(tracking: Tracking) -> tuple[BadSamples, ...]:
+    """The bad samples of one pair."""
+    return tuple(bad for bad in tracking.bad_samples if isinstance(bad, BadSamples))
+
+
+_BAD_WORDS = {
+    "spike": ("spike", "spikes"),
+    "dropout": ("sample of dropouts", "samples of dropouts"),
+    "frozen": ("sample in which it is frozen", "samples in which it is frozen"),
+    "clipped": ("clipped sample", "clipped samples"),
+}
+
+
+def _bad_samples(trusted: Tracking, names: tuple[str, str]) -> str | None:
+    """What is wrong with which samples, and from when."""
+    said = []
+    left_out = False
+    for bad in _of_one(trusted):
+        name = names[0] if bad.channel == "target" else names[1]
+        if bad.kind == "held":
+            said.append(f"{name} is refreshed every {_ordinal(bad.every)} sample only: the fresh ones are judged")
+            continue
+        one, many = _BAD_WORDS[bad.kind]
+        said.append(f"{name} has {bad.count} {one if bad.count == 1 else many}, the first at {bad.first_s:.6g} s")
+        left_out = True
+    if not said:
+        return None
+    end = "; left out of the trusted estimate, not of the published average (--bad-samples keep keeps them)"
+    return "; ".join(said) + (end if left_out else "")
+
+
+def _ordinal(n: int) -> str:
+    ending = "th" if n % 100 in (11, 12, 13) else {1: "st", 2: "nd", 3: "rd"}.get(n % 10, "th")
+    return f"{n}{ending}"
 
 
 def _clipped(signal: NDArray[np.float64], name: str) -> str | None:

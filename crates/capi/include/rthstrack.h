@@ -91,12 +91,14 @@ enum rthstrack_reason
     RTHSTRACK_REASON_AMBIGUOUS = 8,
     // The best delay lies beyond `reason_values[0]` seconds, the largest taken.
     RTHSTRACK_REASON_BEYOND_MAX_DELAY = 9,
-    // Measured moves against the target.
+    // Measured moves against the target; turned round it would lag by about `reason_values[0]` seconds.
     RTHSTRACK_REASON_OPPOSITE_SIGN = 10,
     // The iteration did not settle on a delay.
     RTHSTRACK_REASON_NO_CONVERGENCE = 11,
     // The target is mostly noise of its own: the share `reason_values[0]` of it, or of its velocity.
     RTHSTRACK_REASON_NOISY_TARGET = 12,
+    // Too many samples are bad (spikes, dropouts, frozen or clipped): the share `reason_values[0]`.
+    RTHSTRACK_REASON_BAD_SAMPLES = 13,
     // Another reason without numbers.
     RTHSTRACK_REASON_OTHER = 99,
     // No interval: the residual follows the target with coherence `reason_values[0]`.

@@ -83,12 +83,14 @@ pub enum rthstrack_reason {
     RTHSTRACK_REASON_AMBIGUOUS = 8,
     /// The best delay lies beyond `reason_values[0]` seconds, the largest taken.
     RTHSTRACK_REASON_BEYOND_MAX_DELAY = 9,
-    /// Measured moves against the target.
+    /// Measured moves against the target; turned round it would lag by about `reason_values[0]` seconds.
     RTHSTRACK_REASON_OPPOSITE_SIGN = 10,
     /// The iteration did not settle on a delay.
     RTHSTRACK_REASON_NO_CONVERGENCE = 11,
     /// The target is mostly noise of its own: the share `reason_values[0]` of it, or of its velocity.
     RTHSTRACK_REASON_NOISY_TARGET = 12,
+    /// Too many samples are bad (spikes, dropouts, frozen or clipped): the share `reason_values[0]`.
+    RTHSTRACK_REASON_BAD_SAMPLES = 13,
     /// Another reason without numbers.
     RTHSTRACK_REASON_OTHER = 99,
     /// No interval: the residual follows the target with coherence `reason_values[0]`.
@@ -108,7 +110,7 @@ pub enum rthstrack_reason {
 use rthstrack_reason as Code;
 
 impl Code {
-    const ALL: [Code; 19] = [
+    const ALL: [Code; 20] = [
         Code::RTHSTRACK_REASON_NONE,
         Code::RTHSTRACK_REASON_STILL,
         Code::RTHSTRACK_REASON_NOT_FINITE,
@@ -122,6 +124,7 @@ impl Code {
         Code::RTHSTRACK_REASON_OPPOSITE_SIGN,
         Code::RTHSTRACK_REASON_NO_CONVERGENCE,
         Code::RTHSTRACK_REASON_NOISY_TARGET,
+        Code::RTHSTRACK_REASON_BAD_SAMPLES,
         Code::RTHSTRACK_REASON_OTHER,
         Code::RTHSTRACK_REASON_RESIDUAL_FOLLOWS_TARGET,
         Code::RTHSTRACK_REASON_FEW_BINS,
@@ -145,8 +148,9 @@ impl Code {
             Some(Reason::Uncertain { reach_s }) => with(Code::RTHSTRACK_REASON_UNCERTAIN, reach_s),
             Some(Reason::Ambiguous { delay_s, other_s }) => (Code::RTHSTRACK_REASON_AMBIGUOUS, [delay_s, other_s]),
             Some(Reason::BeyondMaxDelay { max_delay_s }) => with(Code::RTHSTRACK_REASON_BEYOND_MAX_DELAY, max_delay_s),
-            Some(Reason::OppositeSign) => plain(Code::RTHSTRACK_REASON_OPPOSITE_SIGN),
+            Some(Reason::OppositeSign { delay_s }) => with(Code::RTHSTRACK_REASON_OPPOSITE_SIGN, delay_s),
             Some(Reason::NoConvergence) => plain(Code::RTHSTRACK_REASON_NO_CONVERGENCE),
+            Some(Reason::BadSamples { share }) => with(Code::RTHSTRACK_REASON_BAD_SAMPLES, share),
             Some(Reason::NoisyTarget { share }) => with(Code::RTHSTRACK_REASON_NOISY_TARGET, share),
             Some(Reason::ResidualFollowsTarget { coherence }) => {
                 with(Code::RTHSTRACK_REASON_RESIDUAL_FOLLOWS_TARGET, coherence)
@@ -196,6 +200,9 @@ impl Code {
             Code::RTHSTRACK_REASON_NO_CONVERGENCE => c"not determined: the iteration did not settle on a delay",
             Code::RTHSTRACK_REASON_NOISY_TARGET => {
                 c"not determined: target is mostly noise of its own; take a longer window or a band with less noise"
+            }
+            Code::RTHSTRACK_REASON_BAD_SAMPLES => {
+                c"not determined: too many samples are bad (spikes, dropouts, frozen or clipped); look at the sensors"
             }
             Code::RTHSTRACK_REASON_OTHER => c"not determined",
             Code::RTHSTRACK_REASON_RESIDUAL_FOLLOWS_TARGET => {
@@ -249,7 +256,8 @@ mod tests {
             Reason::Uncertain { reach_s: 0.125 },
             Reason::Ambiguous { delay_s: 0.5, other_s: 0.75 },
             Reason::BeyondMaxDelay { max_delay_s: 0.25 },
-            Reason::OppositeSign,
+            Reason::OppositeSign { delay_s: 0.25 },
+            Reason::BadSamples { share: 0.5 },
             Reason::NoConvergence,
             Reason::NoisyTarget { share: 0.5 },
             Reason::ResidualFollowsTarget { coherence: 0.5 },

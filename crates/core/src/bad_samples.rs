@@ -16,9 +16,12 @@ use std::ops::Range;
 
 use pulp::{Arch, NullaryFnOnce};
 
+use crate::alignment::Alignment;
 use crate::lag::{Search, SearchState, View};
 use crate::lagrange::{BEFORE, NODES, Taps};
+use crate::pair::Pair;
 use crate::sums;
+use crate::tracking::EvaluatorConfig;
 
 /// What is done with samples that are no motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -111,6 +114,12 @@ impl BadFound {
     }
 }
 
+/// Both channels of a pair with their bad samples bridged, or read between fresh ones; None where there are none, or where
+/// `config` keeps them.
+pub fn bridged(pair: &Pair<'_>, config: &EvaluatorConfig) -> Option<[Vec<f64>; 2]> {
+    Alignment::examined(pair, config).map(|examination| examination.signals)
+}
+
 /// How one channel lies upon the other: measured_(i + lag) ~ gain target_i + offset.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct About {
@@ -136,11 +145,15 @@ impl About {
         let measured = &view.measured[from..to];
         let target = &view.target[from.wrapping_add_signed(-lag)..to.wrapping_add_signed(-lag)];
         let mut fit = Self { lag, gain: 0.0, offset: 0.0, apart: f64::INFINITY };
+        // What repeats the value before may be no motion; of a converter, or held, most of all may do so.
+        let moves = |i: usize| i > 0 && target[i] != target[i - 1] && measured[i] != measured[i - 1];
+        let moving = 3 * (0..target.len()).filter(|&i| moves(i)).count() > target.len();
         // Once more without what is far off.
         for _ in 0..2 {
             let near = || {
-                let within = |(x, y): &(&f64, &f64)| (*y - fit.gain * *x - fit.offset).abs() <= fit.apart;
-                target.iter().zip(measured).filter(within)
+                let within = move |i: &usize| (measured[*i] - fit.gain * target[*i] - fit.offset).abs() <= fit.apart;
+                let pairs = (0..target.len()).filter(move |&i| !moving || moves(i));
+                pairs.filter(within).map(|i| (target[i], measured[i]))
             };
             let (k, x, y) = near().fold((0.0, 0.0, 0.0), |(k, a, b), (x, y)| (k + 1.0, a + x, b + y));
             let (mean_x, mean_y) = (x / k, y / k);
@@ -154,11 +167,13 @@ impl About {
             let offset = mean_y - gain * mean_x;
             let mut apart = [0.0; 1024];
             let step = (target.len() / apart.len()).max(1);
-            let pairs = target.iter().zip(measured).step_by(step).take(apart.len());
             let mut m = 0;
-            for (x, y) in pairs {
-                apart[m] = (y - gain * x - offset).abs();
+            for i in (0..target.len()).step_by(step).filter(|&i| !moving || moves(i)).take(apart.len()) {
+                apart[m] = (measured[i] - gain * target[i] - offset).abs();
                 m += 1;
+            }
+            if m == 0 {
+                return None;
             }
             let at = (9 * m / 10).min(m - 1);
             let tenth = *apart[..m].select_nth_unstable_by(at, f64::total_cmp).1;
@@ -186,7 +201,9 @@ const STEPS: f64 = 0.8;
 /// One is far off the median of seven by so many times what is typical, and farther than these medians move around it.
 const FAR_OFF: f64 = 8.0;
 /// Spikes side by side, at most.
-const LONGEST_BURST: usize = 4;
+const LONGEST_BURST: usize = 5;
+/// What is left where they were is this share of what stands out.
+const QUIET: f64 = 0.8;
 /// Each look finds what the larger spikes hid.
 const LOOKS: usize = 5;
 /// Fewest equal values that are looked at; of a coarse converter.
@@ -240,6 +257,12 @@ impl Examination {
         self.found
     }
 
+    /// Share of the samples that are left out, of the channel that has more.
+    pub(crate) fn share(&self) -> f64 {
+        let lost = |gaps: &Vec<Range<usize>>| gaps.iter().map(Range::len).sum::<usize>();
+        self.gaps.iter().map(lost).max().unwrap_or(0) as f64 / self.signals[0].len().max(1) as f64
+    }
+
     /// Both channels, of which bad samples are bridged and known; the first sample has this index in the record, which is 0
     /// unless nothing is bad.
     pub(crate) fn view(&self, origin: usize) -> View<'_> {
@@ -265,18 +288,22 @@ impl Examination {
         }
         let held = [0, 1].map(|c| if looks[c].repeats { held(signals[c], looks[c].level) } else { None });
         let repeats = [0, 1].map(|c| looks[c].repeats && held[c].is_none());
-        let mut spiked = false;
-        for c in 0..2 {
-            if held[c].is_none() && looks[c].stands_out {
-                spiked |= self.mark_spikes(c, &looks[c]);
-            }
-        }
-        if (spiked || repeats != [false; 2])
-            && let Some(about) = about()
+        let mut about = Some(about);
+        let mut found = None;
+        let mut ask = || *found.get_or_insert_with(|| about.take().and_then(|about| about()));
+        if repeats != [false; 2]
+            && let Some(about) = ask()
         {
             for c in (0..2).filter(|&c| repeats[c]) {
                 self.mark_runs(c, signals, &about, &looks);
+                bridge(&mut self.signals[c], &self.marks[c], 0..signals[c].len());
             }
+        }
+        let mut spiked = false;
+        for c in (0..2).filter(|&c| held[c].is_none() && looks[c].stands_out) {
+            spiked |= self.mark_spikes(c, &looks[c]);
+        }
+        if spiked && let Some(about) = ask() {
             self.unmark_shared_spikes(signals, &about);
         }
         for c in 0..2 {
@@ -330,20 +357,12 @@ impl Examination {
                     }
                 }
                 if !new {
-                    // What is left may be several side by side.
+                    // What is left may be several close together.
                     let least = least.max(SPIKE_BY_G * by_g);
-                    let mut i = own.start.max(4);
-                    while i < own.end {
-                        let bursts = || (2..=LONGEST_BURST).flat_map(|n| (0..n).map(move |k| (n, k)));
-                        let standing = i + 2 < n && fourth(signal, i).abs() > least && marks[i] == GOOD;
-                        let found =
-                            if standing { bursts().find(|&(n, k)| is_burst(signal, i - k, n, least)) } else { None };
-                        if let Some((n, k)) = found {
-                            marks[i - k..i - k + n].fill(1 + BadKind::Spike as u8);
-                            new = true;
-                            i += n;
+                    for i in own.start.max(6)..own.end {
+                        if i + 6 < n && marks[i] == GOOD && fourth(signal, i).abs() > least {
+                            new |= mark_burst(signal, marks, i, least);
                         }
-                        i += 1;
                     }
                 }
                 if !new {
@@ -939,24 +958,52 @@ fn is_spike(x: &[f64], i: usize, noise: f64) -> bool {
     with_spike < (16.0 * variance).max(0.003 * square) && worse > (12.0 * variance).max(0.1 * square) && square > lines
 }
 
-/// Whether what stands out about sample i is gone when so many samples from `from` on are bridged, all of which leave the bridge.
-fn is_burst(x: &mut [f64], from: usize, length: usize, least: f64) -> bool {
+/// Whether what stands out is gone when some of so many samples from `from` on are read from the good ones around; `bad` has a
+/// bit for each, the first and the last among them. All of them leave the place where they should be by `least` and more, and
+/// the level and the slope are the same before and after.
+fn is_burst(x: &mut [f64], from: usize, length: usize, bad: u32, least: f64) -> bool {
     let to = from + length;
-    if from < 4 || to + 4 > x.len() {
+    if from < 6 || to + 6 > x.len() {
         return false;
     }
+    let [left, right] = [0.5 * (x[from - 1] - x[from - 3]), 0.5 * (x[to + 2] - x[to])];
+    let step = x[to] - x[from - 1] - 0.5 * (left + right) * (length + 1) as f64;
+    let least_height = least.max(STEPS * step.abs()).max(length as f64 * (left - right).abs());
     let mut kept = [0.0; LONGEST_BURST];
     kept[..length].copy_from_slice(&x[from..to]);
-    let (start, step) = (x[from - 1], (x[to] - x[from - 1]) / (length + 1) as f64);
-    let bridge = |i: usize| start + step * (i + 1) as f64;
-    // A step, or a kink, ends where it did not begin.
-    let beside = (x[from - 1] - x[from - 2]).abs().max((x[to + 1] - x[to]).abs());
-    let least_height = least.max(STEPS * (x[to] - x[from - 1]).abs()).max(2.5 * length as f64 * beside);
-    let leaves = (0..length).all(|i| (kept[i] - bridge(i)).abs() > least_height);
-    (0..length).for_each(|i| x[from + i] = bridge(i));
-    let gone = leaves && (from - 2..to + 2).all(|i| fourth(x, i).abs() < least);
+    let is_bad = |i: usize| (from..to).contains(&i) && bad >> (i - from) & 1 == 1;
+    // The cubic through the two nearest good ones on either side.
+    for i in (from..to).filter(|&i| is_bad(i)) {
+        let mut good = [0.0; 4];
+        let (mut before, mut after) = ((0..i).rev().filter(|&k| !is_bad(k)), (i + 1..x.len()).filter(|&k| !is_bad(k)));
+        let places = [before.next(), before.next(), after.next(), after.next()].map(|k| k.unwrap_or(i));
+        for (k, good) in good.iter_mut().enumerate() {
+            let others = (0..4).filter(|&m| m != k);
+            let weight = others.map(|m| (i as f64 - places[m] as f64) / (places[k] as f64 - places[m] as f64));
+            *good = x[places[k]] * weight.product::<f64>();
+        }
+        x[i] = good.iter().sum();
+    }
+    let leaves = (0..length).filter(|&k| is_bad(from + k)).all(|k| (kept[k] - x[from + k]).abs() > least_height);
+    let gone = leaves && (from - 4..to + 4).all(|i| fourth(x, i).abs() < QUIET * least);
     x[from..to].copy_from_slice(&kept[..length]);
     gone
+}
+
+/// Marks the fewest samples about i that make a burst.
+fn mark_burst(x: &mut [f64], marks: &mut [u8], i: usize, least: f64) -> bool {
+    for length in 2..=LONGEST_BURST {
+        let inner = 0..1u32 << (length - 2);
+        for bad in inner.map(|inner| 1 | inner << 1 | 1 << (length - 1)) {
+            for from in i + 1 - length..=i {
+                if is_burst(x, from, length, bad, least) {
+                    (0..length).filter(|k| bad >> k & 1 == 1).for_each(|k| marks[from + k] = 1 + BadKind::Spike as u8);
+                    return true;
+                }
+            }
+        }
+    }
+    false
 }
 
 /// Marks what is far off the median of the seven samples around it, of which three may be bad.

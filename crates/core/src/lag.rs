@@ -43,6 +43,8 @@ pub(crate) const MAX_PEAKS: usize = 64;
 const PEAK_MARGIN: f64 = 0.05;
 /// The peak nearest to the expected delay is looked at down to this.
 const EXPECTED_MARGIN: f64 = 0.2;
+/// Less than this, at the best lag, is no pair: a third of the energy in the motion's own band.
+const LEAST_CORRELATION: f64 = 0.6;
 /// By how much the lowest correlation must outdo the highest before measured is said to move against target.
 const OPPOSITE_MARGIN: f64 = 0.1;
 
@@ -88,8 +90,9 @@ pub(crate) struct Peaks {
     pub(crate) reach: usize,
     /// Cycles that the target moves through in the window.
     pub(crate) cycles: f64,
-    /// The lowest correlation seen.
+    /// The lowest correlation seen, and at which lag.
     lowest: f64,
+    lowest_lag: f64,
 }
 
 impl Peaks {
@@ -197,7 +200,9 @@ impl Search {
         }
         let found = Peaks::collect(state, near, reach, expected);
         let (lowest, highest) = (found.lowest, found.first().correlation);
-        let opposite = -lowest > highest + OPPOSITE_MARGIN;
+        // Upside down it leaves far less than in any place the right way up.
+        let opposite = -lowest > LEAST_CORRELATION
+            && (-lowest > highest + OPPOSITE_MARGIN || 1.0 + lowest < LEFT * (1.0 - highest));
         if opposite || highest < WELL_FOLLOWED {
             // Half a cycle out of reach looks like a sign, and a whole one like the delay: what lies farther away tells.
             let farther = (FARTHER.min(near.step) * reach).min(2 * self.n_samples / 5) / self.max_step * self.max_step;
@@ -209,8 +214,11 @@ impl Search {
                 return Err(Reason::BeyondMaxDelay { max_delay_s: reach as f64 / self.rate_hz });
             }
             if opposite {
-                return Err(Reason::OppositeSign);
+                return Err(Reason::OppositeSign { delay_s: found.lowest_lag / self.rate_hz });
             }
+        }
+        if found.n_peaks > 0 && highest < LEAST_CORRELATION {
+            return Err(Reason::LowCoherence { goodness: highest.max(0.0).powi(2) });
         }
         if found.n_peaks == 0 {
             return Err(Reason::Still);
@@ -302,8 +310,9 @@ impl Peaks {
     fn collect(state: &SearchState, searched: Correlated, reach: usize, expected: Option<f64>) -> Self {
         let Correlated { lags, step, cycles, .. } = searched;
         let correlations = &state.correlations[..2 * lags + 1];
-        let mut found = Self { peaks: [Peak::default(); MAX_PEAKS], n_peaks: 0, step, reach, cycles, lowest: 0.0 };
-        let mut lowest = 0.0_f64;
+        let mut found =
+            Self { peaks: [Peak::default(); MAX_PEAKS], n_peaks: 0, step, reach, cycles, lowest: 0.0, lowest_lag: 0.0 };
+        let (mut lowest, mut lowest_lag) = (0.0_f64, 0.0);
         let mut nearest: Option<Peak> = None;
         for k in 0..correlations.len() {
             let here = correlations[k];
@@ -312,7 +321,10 @@ impl Peaks {
             let after = if k + 1 == correlations.len() { outside } else { correlations[k + 1] };
             if here <= before && here <= after {
                 let inside = before.is_finite() && after.is_finite();
-                lowest = lowest.min(if inside { -summit(-before, -here, -after).1 } else { here });
+                let (shift, top) = if inside { summit(-before, -here, -after) } else { (0.0, -here) };
+                if -top < lowest {
+                    (lowest, lowest_lag) = (-top, (lags as f64 - (k as f64 + shift)) * step as f64);
+                }
             }
             if here < before || here <= after || here.is_nan() {
                 continue;
@@ -338,7 +350,7 @@ impl Peaks {
             found.peaks[at] = peak;
             found.n_peaks = at + 1;
         }
-        Self { lowest, ..found }
+        Self { lowest, lowest_lag, ..found }
     }
 
     /// Inserts in order, dropping the lowest.

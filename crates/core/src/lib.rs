@@ -10,15 +10,16 @@
 //! 3. [`decimate`]: P, as a short cascade or as the paper's Chebyshev filter.
 //! 4. `spectrum`: Q by folding, the transform, the kept bins.
 //! 5. [`tracking`]: Eqs 6-12, amplitude and delay; [`Evaluator`] is the plan, [`EvaluatorState`] its buffers.
-//! 6. `alignment`: the estimators that shift the target before it is windowed; `lag` finds where to start, `lagrange` reads
+//! 6. [`bad_samples`]: spikes, dropouts, frozen, clipped and held samples, which the next step leaves out.
+//! 7. `alignment`: the estimators that shift the target before it is windowed; `lag` finds where to start, `lagrange` reads
 //!    between samples, `floor` tells how noisy the target is, `noise` gives the intervals, [`reason`] says why there is none.
-//! 7. [`moving`]: the same over moving windows.
-//! 8. [`monitor`]: the same while the test runs, sample by sample; [`causal`] is its P.
-//! 9. [`factors`]: the largest P and Q that a tolerance allows.
-//! 10. [`key_frequencies`]: the few bins that hold most of the weight, evaluated alone.
-//! 11. [`response`]: gain, phase, delay and coherence over frequency, with intervals.
-//! 12. [`slopes`]: the same as two straight lines.
-//! 13. [`mod@indices`]: the time-domain indices in use beside them.
+//! 8. [`moving`]: the same over moving windows.
+//! 9. [`monitor`]: the same while the test runs, sample by sample; [`causal`] is its P.
+//! 10. [`factors`]: the largest P and Q that a tolerance allows.
+//! 11. [`key_frequencies`]: the few bins that hold most of the weight, evaluated alone.
+//! 12. [`response`]: gain, phase, delay and coherence over frequency, with intervals.
+//! 13. [`slopes`]: the same as two straight lines.
+//! 14. [`mod@indices`]: the time-domain indices in use beside them.
 //!
 //! [`dynamics`] makes such signals: virtual tests of structures with actuators that lag. It and the evaluation do not know
 //! each other.
@@ -52,7 +53,7 @@ mod sums;
 pub mod tracking;
 pub mod window;
 
-pub use bad_samples::{BAD_KINDS, BadCount, BadFound, BadKind, BadSamples};
+pub use bad_samples::{BAD_KINDS, BadCount, BadFound, BadKind, BadSamples, bridged};
 pub use causal::{CausalDecimator, CausalState};
 pub use decimate::Decimator;
 pub use error::{Error, Result, Signal};

@@ -50,7 +50,10 @@ pub enum Reason {
         max_delay_s: f64,
     },
     /// Measured moves against the target.
-    OppositeSign,
+    OppositeSign {
+        /// The delay that it would have with the opposite sign, in seconds, to a step of the search.
+        delay_s: f64,
+    },
     /// The iteration did not settle.
     NoConvergence,
     /// What the target holds is mostly noise of its own.
@@ -145,9 +148,13 @@ impl fmt::Display for Reason {
                  are searched); raise it or take a longer window"
                 )
             }
-            Reason::OppositeSign => {
-                write!(f, "not determined: measured moves against target; does one of them have the opposite sign?")
-            }
+            Reason::OppositeSign { delay_s } => write!(
+                f,
+                "not determined: measured moves against target, {} of about {:.3} ms if turned round; does one of them have the \
+                 opposite sign?",
+                if *delay_s < 0.0 { "with a lead" } else { "with a lag" },
+                1e3 * delay_s.abs()
+            ),
             Reason::NoConvergence => write!(f, "not determined: the iteration did not settle on a delay"),
             Reason::NoisyTarget { share } => write!(
                 f,

@@ -20,6 +20,7 @@ mod tracking;
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     m.add_class::<tracking::Evaluator>()?;
+    m.add_function(wrap_pyfunction!(tracking::bridged, m)?)?;
     m.add_class::<key_frequencies::KeyFrequencies>()?;
     m.add_class::<monitor::Monitor>()?;
     m.add_function(wrap_pyfunction!(monitor::causal_decimate, m)?)?;

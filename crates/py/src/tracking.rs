@@ -1,7 +1,7 @@
 //! `Evaluator`: the plan, shared by threads; each call takes a state from the pool.
 
 use num_complex::Complex;
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArrayDyn};
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 use rthstrack::{
     BadCount, BadFound, BadKind, BadSamples, Decimator, Detrend, Estimator, EvaluatorConfig, EvaluatorState, Noise,
@@ -95,6 +95,20 @@ impl Settings {
             bad_samples: choice(py, "bad_samples", &BadSamples::NAMES, &self.bad_samples)?,
         })
     }
+}
+
+/// Both signals with their bad samples bridged; nothing where there are none.
+#[pyfunction]
+pub(crate) fn bridged<'py>(
+    py: Python<'py>,
+    target: PyReadonlyArray1<'py, f64>,
+    measured: PyReadonlyArray1<'py, f64>,
+    rate_hz: f64,
+    settings: Settings,
+) -> PyResult<Option<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)>> {
+    let pair = Pair::new(target.as_slice()?, measured.as_slice()?, rate_hz).map_err(|e| to_py(py, &e))?;
+    let found = rthstrack::bridged(&pair, &settings.config(py)?);
+    Ok(found.map(|[target, measured]| (target.into_pyarray(py), measured.into_pyarray(py))))
 }
 
 /// The checked plan for records of one length and rate.

@@ -50,6 +50,9 @@ def add_method(parser: argparse.ArgumentParser, *, trusted: bool = False) -> arg
                         help="noise on measured, for least_squares: white (default) or coloured")  # fmt: skip
     method.add_argument("--noise-ratio", type=not_negative, default=0.0, metavar="X",
                         help="noise on target over that on measured, for least_squares (0)")  # fmt: skip
+    method.add_argument("--bad-samples", choices=("leave_out", "keep"), default="leave_out", metavar="B",
+                        help="spikes, dropouts, frozen and clipped samples, and held ones: leave_out (default) of all "
+                        f"estimators but fei{of_trusted}, or keep")  # fmt: skip
     method.add_argument("--decimator", choices=("spectral", "chebyshev"), default="spectral", metavar="D",
                         help="how P is done: spectral (default) or chebyshev, as published")  # fmt: skip
     method.add_argument("--detrend", choices=("none", "mean", "linear"), default="none", metavar="D",

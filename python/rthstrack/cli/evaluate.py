@@ -208,6 +208,7 @@ def _settings(args: argparse.Namespace) -> Settings:
         expected_delay_s=args.expected_delay,
         noise=args.noise,
         noise_ratio=args.noise_ratio,
+        bad_samples=args.bad_samples,
     )
 
 

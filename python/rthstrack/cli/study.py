@@ -159,6 +159,7 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
         args.expected_delay,
         args.noise,
         args.noise_ratio,
+        args.bad_samples,
     ).checked()
     _make(args.output)
     pairs, failures = _read_all(args)

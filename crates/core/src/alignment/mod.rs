@@ -72,6 +72,8 @@ const TAILS: f64 = 1.6;
 const CLEAR_ODDS: f64 = 1e3 * LOG_ODDS;
 /// Each later look at a peak may go one sample further.
 const LOOKS: f64 = 3.0;
+/// More bad samples than this share leave nothing to trust.
+const MOST_BAD: f64 = 0.3;
 /// A gap of target as short as this is bridged well; so many samples beside it are left out with it.
 const SHORT_GAP: usize = 2;
 const NEAREST: f64 = 2.0;
@@ -487,7 +489,12 @@ impl Alignment {
         if !examination.examine([view.target, view.measured], about) {
             return self.estimate(state, view, start, expected);
         }
-        let tracking = self.estimate(state, &examination.view(view.origin), start, expected);
+        let share = examination.share();
+        let tracking = if share > MOST_BAD {
+            Tracking::undetermined(Reason::BadSamples { share })
+        } else {
+            self.estimate(state, &examination.view(view.origin), start, expected)
+        };
         Tracking { bad_samples: examination.found(), ..tracking }
     }
 
