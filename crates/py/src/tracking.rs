@@ -97,6 +97,9 @@ impl Settings {
     }
 }
 
+/// target, measured
+type Signals<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
+
 /// Both signals with their bad samples bridged; nothing where there are none.
 #[pyfunction]
 pub(crate) fn bridged<'py>(
@@ -105,7 +108,7 @@ pub(crate) fn bridged<'py>(
     measured: PyReadonlyArray1<'py, f64>,
     rate_hz: f64,
     settings: Settings,
-) -> PyResult<Option<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)>> {
+) -> PyResult<Option<Signals<'py>>> {
     let pair = Pair::new(target.as_slice()?, measured.as_slice()?, rate_hz).map_err(|e| to_py(py, &e))?;
     let found = rthstrack::bridged(&pair, &settings.config(py)?);
     Ok(found.map(|[target, measured]| (target.into_pyarray(py), measured.into_pyarray(py))))
