@@ -22,7 +22,8 @@ KEYS = {
     "slopes", "depends_on", "dependence", "argument",
 }  # fmt: skip
 TRUSTED = {
-    "estimator", "amplitude", "amplitude_interval", "delay_s", "delay_interval_s", "target_noise_std", "reason",
+    "estimator", "amplitude", "amplitude_interval", "delay_s", "delay_interval_s", "target_noise_std", "bad_samples",
+    "reason",
 }  # fmt: skip
 INDICES = {
     "max_tracking_error", "max_tracking_error_percent", "rms_error", "rms_error_percent", "tracking_indicator", "j1_s",

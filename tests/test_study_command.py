@@ -134,7 +134,7 @@ def test_settings_reach_the_study(capsys: pytest.CaptureFixture[str], recorded: 
         "P": [1, 4, 16], "Q": [1, 2], "combined": [4, 2], "windows": ["tukey"], "weight_powers": [3, 1],
         "estimator": "fei", "decimator": "chebyshev", "detrend": "mean", "band_hz": [0.5, 20.0], "timing": False,
         "choose": [], "tolerance": 0.005, "shares": [], "max_delay_s": 0.25,
-        "expected_delay_s": None, "noise": "white", "noise_ratio": 0.0,
+        "expected_delay_s": None, "noise": "white", "noise_ratio": 0.0, "bad_samples": "leave_out",
     }  # fmt: skip
     (source,) = document["study"]["sources"]
     assert (source["measured_name"], source["rate_hz"]) == ("other (mm)", 400)

@@ -319,6 +319,7 @@ def test_json_and_csv_hold_the_trusted_numbers(capsys: pytest.CaptureFixture[str
         "delay_s": trusted.delay_s,
         "delay_interval_s": list(trusted.delay_interval_s),
         "target_noise_std": 0.0,
+        "bad_samples": [],
         "reason": None,
     }
     low, high = result["trusted"]["delay_interval_s"]

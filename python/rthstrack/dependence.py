@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
-from scipy import fft, special
 
 from rthstrack.tracking import _Result
 
@@ -171,6 +170,8 @@ class _Fit:
 
     def odds(self, first: int) -> float:
         """Probability that noise makes the coefficients from `first` on as large as they are."""
+        from scipy import special
+
         b = self.coefficients[first:]
         if not self.known:
             return 1.0
@@ -191,6 +192,8 @@ def _spectra(target: Floats, measured: Floats, tracking: Tracking) -> tuple[NDAr
 
     Taken over from the evaluation where it has them.
     """
+    from scipy import fft
+
     n, settings = target.size, tracking.settings
     few = 1 + n // 500
     ends = np.array([(part[:few].mean(), part[-few:].mean()) for part in (target, measured)])
@@ -226,6 +229,8 @@ def _spectra(target: Floats, measured: Floats, tracking: Tracking) -> tuple[NDAr
 
 
 def _motion(target: Floats, measured: Floats, tracking: Tracking, trusted: Tracking) -> _Motion | None:
+    from scipy import fft
+
     n, delay_s, rate_hz = target.size, float(trusted.delay_s), trusted.rate_hz
     spectra, energy, size = _spectra(target, measured, tracking)
     df = rate_hz / size
@@ -407,6 +412,8 @@ def _level(motion: _Motion, rows: NDArray[np.bool_], where: Interval) -> Level:
 
 def _known(fit: _Fit, where: Interval, gain: float, by_gain: Floats, delay: float, by_delay: Floats) -> Level:
     """A level with the intervals of gain and delay, as sums of the coefficients."""
+    from scipy import special
+
     if not fit.known:
         return Level(where, delay, NO_INTERVAL, gain, NO_INTERVAL)
     t = float(special.stdtrit(fit.free, 0.975))
@@ -567,6 +574,8 @@ def _told(
     response: FrequencyResponse | None,
 ) -> tuple[Dependence, list[tuple[Level, Level]]]:
     """The figures of one cause, and pairs of levels, any of which may show that it matters."""
+    from scipy import special
+
     start, end = float(motion.time_s[0]), float(motion.time_s[-1])
     fit = fits[name]
     if name == "frequency":

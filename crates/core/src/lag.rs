@@ -201,8 +201,8 @@ impl Search {
         let found = Peaks::collect(state, near, reach, expected);
         let (lowest, highest) = (found.lowest, found.first().correlation);
         // Upside down it leaves far less than in any place the right way up.
-        let opposite = -lowest > LEAST_CORRELATION
-            && (-lowest > highest + OPPOSITE_MARGIN || 1.0 + lowest < LEFT * (1.0 - highest));
+        let far_less = highest < WELL_FOLLOWED && 1.0 + lowest < LEFT * (1.0 - highest);
+        let opposite = -lowest > LEAST_CORRELATION && (-lowest > highest + OPPOSITE_MARGIN || far_less);
         if opposite || highest < WELL_FOLLOWED {
             // Half a cycle out of reach looks like a sign, and a whole one like the delay: what lies farther away tells.
             let farther = (FARTHER.min(near.step) * reach).min(2 * self.n_samples / 5) / self.max_step * self.max_step;

@@ -122,6 +122,11 @@ impl fmt::Display for Reason {
                 "not determined: only {:.0} % of measured follows target; is this the right pair?",
                 100.0 * goodness.max(0.0)
             ),
+            Reason::Uncertain { reach_s } if *reach_s > 1.0 => write!(
+                f,
+                "not determined: noise leaves the delay uncertain by more than a second either way; take a longer window or a \
+                 band with less noise"
+            ),
             Reason::Uncertain { reach_s } => write!(
                 f,
                 "not determined: noise leaves the delay uncertain by {:.3} ms either way, more than half a turn; \
