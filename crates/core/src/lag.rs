@@ -146,9 +146,14 @@ struct Correlated {
 impl Correlated {
     /// How high the highest peak is of lags and leads longer than `reach` samples.
     fn highest_beyond(&self, correlations: &[f64], reach: usize) -> Option<f64> {
-        let tops = (1..2 * self.lags).filter(|k| k.abs_diff(self.lags) * self.step > reach).filter_map(|k| {
+        let tops = (1..2 * self.lags).filter_map(|k| {
             let [before, here, after] = [correlations[k - 1], correlations[k], correlations[k + 1]];
-            (here >= before && here > after).then(|| summit(before, here, after).1)
+            if here < before || here <= after {
+                return None;
+            }
+            let (shift, top) = summit(before, here, after);
+            let lag = (k as f64 + shift - self.lags as f64).abs() * self.step as f64;
+            (lag > reach as f64).then_some(top)
         });
         tops.max_by(f64::total_cmp)
     }
