@@ -263,12 +263,10 @@ impl Examination {
         self.gaps.iter().map(lost).max().unwrap_or(0) as f64 / self.signals[0].len().max(1) as f64
     }
 
-    /// Both channels, of which bad samples are bridged and known; the first sample has this index in the record, which is 0
-    /// unless nothing is bad.
-    pub(crate) fn view(&self, origin: usize) -> View<'_> {
-        debug_assert_eq!(origin, 0);
+    /// Both channels from the first sample of the record on, with bad samples bridged, and known as gaps.
+    pub(crate) fn view(&self) -> View<'_> {
         let [target, measured] = &self.signals;
-        View { target, measured, origin, gaps: [&self.gaps[0], &self.gaps[1]] }
+        View { target, measured, origin: 0, gaps: [&self.gaps[0], &self.gaps[1]] }
     }
 
     /// Looks at both channels; whether there are bad samples. `about` is asked at most once, and only where it matters.

@@ -65,6 +65,11 @@ impl<'a> View<'a> {
         Self { target: pair.target(), measured: pair.measured(), origin: 0, gaps: [&[], &[]] }
     }
 
+    /// Whether some samples are no motion.
+    pub(crate) fn has_gaps(&self) -> bool {
+        self.gaps.iter().any(|gaps| !gaps.is_empty())
+    }
+
     /// Index in the record past the last sample.
     pub(crate) fn end(&self) -> usize {
         self.origin + self.target.len()

@@ -848,7 +848,7 @@ impl Evaluator {
 
 /// A pair without its bad samples.
 fn view<'a>(pair: &Pair<'a>, examination: Option<&'a Examination>) -> View<'a> {
-    examination.map_or_else(|| View::whole(pair), |e| e.view(0))
+    examination.map_or_else(|| View::whole(pair), Examination::view)
 }
 
 impl Moving<'_> {

@@ -493,7 +493,7 @@ impl Alignment {
         let tracking = if share > MOST_BAD {
             Tracking::undetermined(Reason::BadSamples { share })
         } else {
-            self.estimate(state, &examination.view(view.origin), start, expected)
+            self.estimate(state, &examination.view(), start, expected)
         };
         Tracking { bad_samples: examination.found(), ..tracking }
     }
@@ -866,9 +866,7 @@ impl Alignment {
         let lags = || peaks.iter().map(|p| p.lag);
         let (least, most) = (lags().fold(f64::INFINITY, f64::min), lags().fold(f64::NEG_INFINITY, f64::max));
         // All are judged on the same samples.
-        let support = self.support_around(state, view, start, least, most, step);
-        self.check_support(state, &support)?;
-        self.place_answer(state, view, start, &support, in_bins);
+        let support = self.placed_around(state, view, start, [least, most], step, in_bins)?;
         let mut turns = Turns::default();
         for (i, peak) in peaks.iter().enumerate() {
             let fit = self.refine(state, view, start, &support, peak.lag, room, in_bins);
@@ -900,32 +898,43 @@ impl Alignment {
         step: usize,
         in_bins: bool,
     ) -> std::result::Result<(Fit, Range<usize>), Reason> {
-        let mut found = None;
-        // With gaps once more, where fewer samples are compared with them.
-        let has_gaps = view.gaps.iter().any(|gaps| !gaps.is_empty());
-        for (lag, step) in [(Some(lag), step), (None, 0)].into_iter().take(if has_gaps { 2 } else { 1 }) {
-            let lag = lag.or(found.as_ref().map(|(fit, _): &(Fit, Range<usize>)| fit.tau)).unwrap_or(0.0);
-            let support = self.support_around(state, view, start, lag, lag, step);
-            self.check_support(state, &support)?;
-            self.place_answer(state, view, start, &support, in_bins);
-            let fit = self.refine(state, view, start, &support, lag, room(step), in_bins)?;
-            found = Some((fit, support));
+        let found = self.around_once(state, view, start, lag, step, in_bins)?;
+        if !view.has_gaps() {
+            return Ok(found);
         }
-        found.ok_or(Reason::NoConvergence)
+        // Near the delay fewer samples are compared with gaps of target.
+        self.around_once(state, view, start, found.0.tau, 0, in_bins)
     }
 
-    /// The support of a search from `least` to `most`.
-    fn support_around(
+    fn around_once(
         &self,
         state: &mut AlignmentState,
         view: &View<'_>,
         start: usize,
-        least: f64,
-        most: f64,
+        lag: f64,
         step: usize,
-    ) -> Range<usize> {
+        in_bins: bool,
+    ) -> std::result::Result<(Fit, Range<usize>), Reason> {
+        let support = self.placed_around(state, view, start, [lag, lag], step, in_bins)?;
+        let fit = self.refine(state, view, start, &support, lag, room(step), in_bins)?;
+        Ok((fit, support))
+    }
+
+    /// The support of a search from `least` to `most`, on which measured is placed.
+    fn placed_around(
+        &self,
+        state: &mut AlignmentState,
+        view: &View<'_>,
+        start: usize,
+        [least, most]: [f64; 2],
+        step: usize,
+        in_bins: bool,
+    ) -> std::result::Result<Range<usize>, Reason> {
         let room = room(step) + LOOKS;
-        self.support(state, view, start, least - room, most + room)
+        let support = self.support(state, view, start, least - room, most + room);
+        self.check_support(state, &support)?;
+        self.place_answer(state, view, start, &support, in_bins);
+        Ok(support)
     }
 
     /// Keeps of `turns` those that fit as well as the likeliest, which is returned: whose likelihood is not below its by
@@ -1054,7 +1063,7 @@ impl Alignment {
         let support = self.known(view, start, least, most);
         state.lost.clear();
         state.n_lost = 0;
-        if view.gaps.iter().all(|gaps| gaps.is_empty()) {
+        if !view.has_gaps() {
             return support;
         }
         state.lose(view.gaps, &support, least, most);
