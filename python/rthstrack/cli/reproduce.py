@@ -97,12 +97,12 @@ def _progress() -> Iterator[Callable[[str, int, int], Any] | None]:
 
 def _print_text(result: Reproduction, out: Path) -> None:
     """What was used, how the statements came out, and where everything is."""
+    from rthstrack.reproduction.claims import MEANINGS
+
     for used in result.records.values():
         print(f"{used.name}: {used.remark or used.motion.source}")
     claims = result.claims
     count = Counter(claim.verdict for claim in claims)
-    print(
-        f"{len(claims)} statements of the paper: {count['agrees']} agree, {count['does not agree']} do not, "
-        f"{count['cannot be compared']} cannot be compared"
-    )
+    found = ", ".join(f"{count[verdict]} {verdict}" for verdict in MEANINGS if count[verdict])
+    print(f"{len(claims)} statements of the paper: {found}")
     print(f"see {out / 'claims.md'}; figures and tables beside it")

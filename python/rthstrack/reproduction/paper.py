@@ -12,11 +12,12 @@ DELAY_S = {"linear": 1e-3, "nonlinear": 5e-3}
 POWERS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)
 TABLE_P = (1, 2, 4, 8, 16, 32, 64)
 TABLE_Q = (1, 2, 4, 8, 16, 32)
-ALPHA = 29.0
 ALPHA_ES = (15, 29, 45)
 
 #: Section 3.2: delay in ms by alpha_es; the lists are printed in this order.
 EXPERIMENT_DELAY_MS = {15: -15.6, 29: -0.4, 45: 13.2}
+#: The same with the list of delays reversed, as it must be (claims of section 3.2).
+REVERSED_DELAY_MS = {15: 13.2, 29: -0.4, 45: -15.6}
 
 #: Section 3.1.1: highest frequency for P = 1 to 512, Hz.
 HIGHEST_FREQUENCY_HZ = ("512", "256", "128", "64", "32", "16", "8", "4", "2", "1")

@@ -5,11 +5,12 @@ It stands beside ours: computing times are compared like with like, and what P d
 
 from __future__ import annotations
 
+import functools
 import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 import scipy.fft
@@ -20,17 +21,31 @@ if TYPE_CHECKING:
 
 Decimate: TypeAlias = "Callable[[NDArray[np.float64], int], NDArray[np.float64]]"
 
-_ROUNDS = 4
+#: Rounds of timing, at least 2.
+_ROUNDS = 10
+
+
+class Timing(NamedTuple):
+    """Processor time of a call: the median of all rounds, of every other round, and of the rounds between."""
+
+    time_s: float
+    first_s: float
+    second_s: float
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """A and d by the paper's form, NaN where the filter left nothing finite; `computing_time_s` NaN if not timed."""
+    """A and d by the paper's form, NaN where the filter left nothing finite.
+
+    The times are those of `Timing`, NaN if not timed: a statement on them must hold in both halves of the rounds.
+    """
 
     amplitude: float
     delay_s: float
     equivalent_frequency_hz: float
     computing_time_s: float = math.nan
+    first_time_s: float = math.nan
+    second_time_s: float = math.nan
 
 
 def second_order_sections(x: NDArray[np.float64], P: int) -> NDArray[np.float64]:
@@ -56,6 +71,7 @@ def lowered_order(x: NDArray[np.float64], P: int) -> NDArray[np.float64]:
     return np.asarray(filtered[(len(x) - 1) % P :: P])
 
 
+@functools.cache
 def order_of_matlab(P: int) -> int:
     """The largest order up to 8 whose gain at 0.8/P is within 1e-6 dB of the ripple, 0.05 dB."""
     for order in range(8, 1, -1):
@@ -95,14 +111,42 @@ def evaluate(
         return Reading(float(abs(fei)), float(-np.angle(fei) / (2 * np.pi * f_eq)), float(f_eq))
 
 
-def fastest_s(calls: Sequence[Callable[[], object]], done: Callable[[int, int], object]) -> list[float]:
-    """The fastest time of each call, of two in each of several rounds, so that a busy spell hits none every time."""
-    best = [math.inf] * len(calls)
-    for round_number in range(_ROUNDS):
+def measured(calls: Sequence[Callable[[], object]], done: Callable[[int, int], object]) -> list[Timing]:
+    """The processor time of each call, in rounds, as if the machine always ran at the same speed.
+
+    What else runs there slows a processor down by up to half, for seconds: a yardstick, a transform and a filter of
+    always the same samples, is timed before and after each call, and the call's time divided by how slow it was.
+    """
+    found: list[list[float]] = [[] for _ in calls]
+    yardsticks = []
+    for number in range(_ROUNDS):
         for i, call in enumerate(calls):
-            for _ in range(2):
-                start = time.perf_counter()
-                call()
-                best[i] = min(best[i], time.perf_counter() - start)
-            done(round_number * len(calls) + i + 1, _ROUNDS * len(calls))
-    return best
+            before = _yardstick_s()
+            call_s = _processor_s(call)
+            yardstick = (before + _yardstick_s()) / 2
+            found[i].append(call_s / yardstick)
+            yardsticks.append(yardstick)
+            done(number * len(calls) + i + 1, _ROUNDS * len(calls))
+    unhindered_s = float(np.quantile(yardsticks, 0.05))
+    return [Timing(*(unhindered_s * float(np.median(x)) for x in (one, one[::2], one[1::2]))) for one in found]
+
+
+def _yardstick_s() -> float:
+    return min(_processor_s(_yardstick) for _ in range(2))
+
+
+def _yardstick() -> None:
+    samples, filter_b, filter_a = _yardstick_parts()
+    scipy.fft.rfft(samples)
+    scipy.signal.lfilter(filter_b, filter_a, samples)
+
+
+@functools.cache
+def _yardstick_parts() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    return np.sin(np.arange(16384.0) ** 1.5), *scipy.signal.cheby1(4, 0.05, 0.3)
+
+
+def _processor_s(call: Callable[[], object]) -> float:
+    start = time.thread_time()
+    call()
+    return max(time.thread_time() - start, 1e-9)

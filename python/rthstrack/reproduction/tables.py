@@ -22,7 +22,8 @@ TABLES = {
     "table-2": ("nonlinear-mu2035", "nonlinear-chy101-n"),
     "table-3": tuple(f"experiment-{alpha_es}" for alpha_es in paper.ALPHA_ES),
 }
-_ROUTES = ((SCIPY, "paper's form in SciPy"), (SPECTRAL, "ours, spectral"))
+_ROUTES = ((SCIPY, "its form in SciPy"), (SPECTRAL, "ours"))
+_WHERE = {"CANOGA": "Canoga Park"}
 _SHADES = LinearSegmentedColormap.from_list("share", ("#9ecae1", "#ffffff", "#fdae6b"))
 
 
@@ -30,7 +31,7 @@ def rows(r: Reproduction, name: str) -> Iterator[tuple[str | float, ...]]:
     """A row a case, P and Q, after a header: times in ms, and over that of the table's first cell."""
     routes = (SCIPY, SPECTRAL, CHEBYSHEV)
     header = [f"{what}_{unit}" for what in ("printed", *(route for route in routes)) for unit in ("ms", "ratio")]
-    yield ("case", "record_used", "P", "Q", *header)
+    yield ("case", "record_printed", "record_used", "P", "Q", *header)
     for key in TABLES[name]:
         printed = paper.TIMES_MS[key]
         first = (1, min(Q for _, Q in printed))
@@ -42,7 +43,7 @@ def rows(r: Reproduction, name: str) -> Iterator[tuple[str | float, ...]]:
                 for route in routes:
                     seconds = r.cell(route, key, P, Q).computing_time_s
                     cells += [1e3 * seconds, seconds / r.cell(route, key, *first).computing_time_s]
-                yield (key, used, P, Q, *cells)
+                yield (key, CASES[key].record, used, P, Q, *cells)
 
 
 def draw(r: Reproduction, name: str) -> Figure:
@@ -54,14 +55,17 @@ def draw(r: Reproduction, name: str) -> Figure:
         for row, key in zip(axes, keys, strict=True):
             printed = paper.TIMES_MS[key]
             first = (1, min(Q for _, Q in printed))
-            blocks = [("printed (ms)", printed)]
+            case = CASES[key]
+            used = r.records[case.record]
+            where = _WHERE.get(case.record, case.record)
+            blocks = [(f"printed (ms), {where}", printed)]
             for route, words in _ROUTES:
                 times = {
                     (P, Q): 1e3 * r.cell(route, key, P, Q).computing_time_s
                     for P in paper.TABLE_P
                     for Q in paper.TABLE_Q
                 }
-                blocks.append((f"{words} (ms)", times))
+                blocks.append((f"{words} (ms), {used.motion.name if used.remark else where}", times))
             for ax, (words, times) in zip(row, blocks, strict=True):
                 grid = np.array([[times.get((P, Q), np.nan) for Q in paper.TABLE_Q] for P in paper.TABLE_P])
                 ax.imshow(grid / times[first], cmap=_SHADES, norm=LogNorm(0.05, 20), aspect="auto")
@@ -75,9 +79,7 @@ def draw(r: Reproduction, name: str) -> Figure:
                 ax.spines[:].set_visible(False)
                 ax.set_title(words, loc="left", pad=3)
                 ax.set_xlabel("Q", labelpad=1)
-            case = CASES[key]
-            used = r.records[case.record]
-            name_of = rf"$\alpha_{{es}}$ = {case.alpha_es}" if case.alpha_es else f"{case.kind}, {used.motion.name}"
+            name_of = rf"$\alpha_{{es}}$ = {case.alpha_es}" if case.alpha_es else case.kind
             row[0].set_ylabel(f"{name_of}\nP")
         said = [f"Shaded by the share of the time at P = 1, Q = {2 if name == 'table-3' else 1}."]
         said += ["CHY101-N as printed is read one line up (see claims)."] if name == "table-1" else []

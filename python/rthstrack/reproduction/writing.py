@@ -17,14 +17,15 @@ from rthstrack._core import __version__
 from rthstrack.errors import RecordingError, SettingError
 from rthstrack.plots import _style
 from rthstrack.reproduction import figures, paper, tables
-from rthstrack.reproduction.claims import TERMS, Claim
+from rthstrack.reproduction.claims import MEANINGS, TERMS, WORDS, Claim
+from rthstrack.reproduction.far_field import WINDOWS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rthstrack.reproduction import Reproduction
 
-_CLAIM_COLUMNS = ("section", "statement", "printed", "ours", "verdict", "why")
+_CLAIM_COLUMNS = ("section", "statement", "printed", "ours", "verdict", "tolerance", "window", "why")
 
 
 def prepare(out: Path) -> None:
@@ -37,7 +38,7 @@ def prepare(out: Path) -> None:
 
 def write(r: Reproduction, out: Path, progress: Callable[[int, int], object]) -> None:
     """Writes everything. Files of the same names are overwritten, no others. Raises RecordingError."""
-    total = len(figures.FIGURES) + 1 + len(tables.TABLES) + 1
+    total = len(figures.FIGURES) + len(figures.SUPPLEMENTS) + len(tables.TABLES) + 1
     try:
         for done, plate in enumerate(figures.plates(r), start=1):
             _save(figures.draw(plate), out / plate.name)
@@ -63,8 +64,13 @@ def claims_text(r: Reproduction, claims: Sequence[Claim]) -> str:
     lines = [
         "# Statements of the paper, one by one",
         "",
-        f"{paper.CITATION}. {len(claims)} quantitative statements: {count['agrees']} agree, {count['does not agree']} "
-        f"do not, {count['cannot be compared']} cannot be compared.",
+        f"{paper.CITATION}. {len(claims)} statements:",
+        "",
+        "| verdict | | meaning |",
+        "| --- | --- | --- |",
+        *(f"| `{verdict}` | {count[verdict]} | {meaning} |" for verdict, meaning in MEANINGS.items()),
+        "",
+        _by_way(claims),
         "",
         f"rthstrack {__version__}, Python {platform.python_version()}, NumPy {np.__version__}, SciPy "
         f"{scipy.__version__}, {platform.machine()}; {r.seconds:.0f} s for tests, readings and timing.",
@@ -76,14 +82,25 @@ def claims_text(r: Reproduction, claims: Sequence[Claim]) -> str:
         lines.append(f"- {name}: {used.remark or used.motion.name} ({used.motion.source})")
     lines += ["", "Words:", "", *(f"- {term}" for term in TERMS), ""]
     lines += [
-        "| section | statement | printed | ours | verdict | why, remarks |",
-        "| --- | --- | --- | --- | --- | --- |",
+        "| section | statement | printed | ours | verdict | tolerance | window | why, remarks |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for c in claims:
-        verdict = f"**{c.verdict}**" if c.verdict == "does not agree" else c.verdict
-        cells = (c.section, c.statement, c.printed, c.ours, verdict, c.why)
+        verdict = f"**{c.verdict}**" if c.verdict in ("differs", "slip") else c.verdict
+        cells = (c.section, c.statement, c.printed, c.ours, verdict, c.tolerance, c.window, c.why)
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines) + "\n"
+
+
+def _by_way(claims: Sequence[Claim]) -> str:
+    """With which way of evaluating most statements hold."""
+    judged = [dict(claim.by_way) for claim in claims if claim.by_way]
+    held = {way: sum(found[way] == "agrees" for found in judged) for way in WINDOWS}
+    return (
+        f"Of {len(judged)} statements on A and d that were judged in three ways, "
+        + ", ".join(f"{count} hold with {WORDS[way]}" for way, count in held.items())
+        + "."
+    )
 
 
 def _save(figure: Figure, stem: Path) -> None:
