@@ -239,3 +239,128 @@ def test_cases_of_the_field(name: str, kinds: list[tuple[str, str, int]]) -> Non
     assert "distinct values" not in said
     assert ("every 5th sample" in said) == (name == "measured_held_5_samples")
     assert ("stands 13.67 lower" in said) == (name == "offset_on_measured")
+
+
+# Kinds that an independent attack found ----------------------------------------------------------------------------
+
+
+def two_tones(seconds: float = 10.0, rate_hz: float = 1000.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Target, and 0.97 times it 12 ms later, without noise; both from their formula."""
+    t = np.arange(round(seconds * rate_hz)) / rate_hz
+
+    def motion(at: NDArray[np.float64]) -> NDArray[np.float64]:
+        return 10 * np.sin(2 * np.pi * 2 * at) + 4 * np.sin(2 * np.pi * 4.74 * at + 1)
+
+    return motion(t), 0.97 * motion(t - 0.012)
+
+
+@pytest.mark.parametrize("every", [3, 10, 20])
+@pytest.mark.parametrize("noise", [0.0, 3e-4, 1e-3])
+def test_a_held_sensor_is_known_where_the_motion_rests_on_a_converter_s_steps(every: int, noise: float) -> None:
+    rate_hz, delay_s = 1000.0, 0.012
+    t = np.arange(20_000) / rate_hz
+
+    def steps(at: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(np.tanh((at - 5) / 0.06) - 0.5 * np.tanh((at - 11) / 0.06))
+
+    target, measured = steps(t), steps(t - delay_s)
+    measured = measured + noise * np.random.default_rng(every).normal(size=t.size)
+    quantum = 4 / 2**12
+    measured = (np.round(measured / quantum) * quantum)[np.arange(t.size) // every * every]
+    found = rthstrack.evaluate(target, measured, rate_hz, **TRUSTED)
+    assert [(b.kind, b.every) for b in found.bad_samples] == [("held", every)]  # type: ignore[union-attr]
+    # Unseen it would be late by (every - 1) / 2 samples, 1 to 9.5 ms.
+    assert abs(found.delay_s - delay_s) < 0.35e-3
+
+
+@pytest.mark.parametrize("length", [100, 300, 450])
+@pytest.mark.parametrize("place", [200, 3000, 9000])
+def test_a_rail_far_outside_is_found_however_much_of_the_correlation_it_takes(length: int, place: int) -> None:
+    target, measured = two_tones()
+    measured = measured + 0.01 * np.random.default_rng(place).normal(size=measured.size)
+    measured[place : place + length] = 100.0
+    found = rthstrack.evaluate(target, measured, 1000.0, **TRUSTED)
+    assert entries(found) == [("measured", "dropout", length, place)]
+    assert abs(found.delay_s - 0.012) < 5e-5
+
+
+@pytest.mark.parametrize("bits", [12, 16])
+def test_short_stretches_and_clipping_are_found_on_a_converter_without_noise(bits: int) -> None:
+    target, measured = two_tones()
+    quantum = 100 / 2**bits
+    measured = np.round(measured / quantum) * quantum
+    for value in (0.0, float(measured[3009])):
+        broken = measured.copy()
+        broken[3010:3040] = value
+        found = rthstrack.evaluate(target, broken, 1000.0, **TRUSTED)
+        assert [(b.channel, b.first) for b in found.bad_samples] == [("measured", 3010)]  # type: ignore[union-attr]
+    clipped = np.round(np.minimum(measured, 0.85 * measured.max()) / quantum) * quantum
+    found = rthstrack.evaluate(target, clipped, 1000.0, **TRUSTED)
+    (only,) = found.bad_samples
+    assert only.kind == "clipped"  # type: ignore[union-attr]
+    assert only.count == np.count_nonzero(clipped == clipped.max())  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("at", [0, -1])
+def test_a_spike_at_the_very_end_is_one(at: int) -> None:
+    target, measured = two_tones()
+    measured = measured + 0.01 * np.random.default_rng(1).normal(size=measured.size)
+    measured[at] += 5.0
+    found = rthstrack.evaluate(target, measured, 1000.0, **TRUSTED)
+    assert entries(found) == [("measured", "spike", 1, at % measured.size)]
+
+
+def test_a_command_with_flat_tops_before_a_slow_actuator_is_not_clipped() -> None:
+    t = np.arange(8000) / 1000
+    target = np.clip(1.5 * 2 / np.pi * np.arcsin(np.sin(2 * np.pi * 0.6 * t)), -1, 1)
+    step = 0.8 * np.abs(np.diff(target)).max()
+    measured, here = np.empty_like(target), target[0]
+    for i, wanted in enumerate(target):
+        here += np.clip(0.3 * (wanted - here), -step, step)
+        measured[i] = here
+    measured += 1e-3 * np.random.default_rng(0).normal(size=t.size)
+    assert rthstrack.evaluate(target, measured, 1000.0, **TRUSTED).bad_samples == ()
+
+
+def test_a_command_that_comes_to_rest_before_a_noisy_sensor_is_not_frozen() -> None:
+    t = np.arange(8000) / 1000
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        places, heights = rng.uniform(0.4, 7.6, 8), rng.normal(size=8)
+
+        def steps(at: NDArray[np.float64], p: object = places, h: object = heights) -> NDArray[np.float64]:
+            return np.asarray(np.tanh((at[:, None] - p) / 0.06) @ h / 2)  # type: ignore[operator]
+
+        measured = steps(t - 0.012) + 0.003 * rng.normal(size=t.size)
+        assert rthstrack.evaluate(steps(t), measured, 1000.0, **TRUSTED).bad_samples == ()
+
+
+@pytest.mark.parametrize("part", [slice(0, 400), slice(-400, None)])
+@pytest.mark.parametrize("frozen", [False, True])
+def test_a_fault_at_an_end_is_no_delay_that_changes(part: slice, frozen: bool) -> None:
+    t = np.arange(4000) / 500
+
+    def motion(at: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(10 * np.sin(2 * np.pi * 1.3 * at) + 4 * np.sin(2 * np.pi * 3.1 * at + 1))
+
+    measured = 0.97 * motion(t - 0.012) + 0.02 * np.random.default_rng(0).normal(size=t.size)
+    measured[part] = measured[part][0 if part.stop is None else -1] if frozen else 0.0
+    assessed = rthstrack.assess(motion(t), measured, 500.0)
+    assert assessed.trusted.bad_samples
+    assert assessed.depends_on is None
+    assert abs(assessed.trusted.delay_s - 0.012) < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("target", "measured", "message"),
+    [
+        ([], [], "there are no samples"),
+        (np.zeros((8, 2)), np.zeros((8, 2)), "one actuator at a time"),
+        (np.zeros(8, dtype=complex), np.zeros(8), "must hold real numbers"),
+    ],
+)
+def test_what_is_no_channel_is_one_line(target: object, measured: object, message: str) -> None:
+    with pytest.raises(rthstrack.SignalError, match=message):
+        rthstrack.assess(target, measured, 500.0)  # type: ignore[arg-type]
+    with pytest.raises(rthstrack.SettingError, match="rate_hz must be a number"):
+        rthstrack.assess(np.zeros(8), np.zeros(8), "fast")  # type: ignore[arg-type]

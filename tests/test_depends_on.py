@@ -209,3 +209,30 @@ def test_an_uncertainty_beyond_the_record_is_no_number(reason: str, told: str | 
 
     tracking = dataclasses.replace(assessed(late(0.01)).tracking, reason=reason)
     assert rthstrack.verdict.reason(tracking) == (told or reason)
+
+
+U = T / SECONDS
+
+
+@pytest.mark.parametrize(
+    ("course", "gain"),
+    [
+        (0.008 * np.sin(np.pi * U), 1.0),
+        (0.004 * np.sin(6 * np.pi * U), 1.0),
+        (0.008 * (1 - np.exp(-5 * U)), 1.0),
+        (0.008 * (1 - np.cos(np.pi * U)) / 2, 1.0),
+        (0.0133 * np.clip(U - 0.4, 0, None), 1.0),
+        (0.008 * ((U > 0.35) & (U < 0.65)), 1.0),
+        (np.zeros(N), 1 - 0.15 * np.sin(np.pi * U)),
+    ],
+    ids=["hump", "wobble", "warming up", "half a cosine", "late", "there and back", "gain"],
+)
+def test_what_changes_unevenly_changes_over_time_and_is_no_clock(course: Signal, gain: Signal | float) -> None:
+    assessed_ = assessed(noisy(gain * late(0.012 + course), 0.003))
+    assert assessed_.depends_on == "time"
+    found = assessed_.dependence
+    assert found is not None
+    if found.form == "course":
+        apart = [abs(b - a) for a, b in zip(*[(lv.delay_s, lv.gain) for lv in found.levels], strict=True)]
+        assert apart[0] > 0.6 * np.ptp(course) - 1e-4
+        assert all(0 <= lv.where[0] <= SECONDS for lv in found.levels)

@@ -22,6 +22,8 @@ from rthstrack.tracking import (
     BadSamples,
     Evaluator,
     Settings,
+    _number,
+    _single,
     bridged,
     evaluate_moving,
     frequency_response,
@@ -137,11 +139,13 @@ def assess(
     """
     asked_for = settings or Settings()
     settings = without_trusted(asked_for)
-    t = np.ascontiguousarray(target, dtype=np.float64)
-    m = np.ascontiguousarray(measured, dtype=np.float64)
+    t, m = _single(target, measured)
+    rate_hz = _number("rate_hz", rate_hz)
+    if not t.size:
+        raise SignalError("there are no samples to judge: both channels are empty")
     factors = _chosen(t, m, rate_hz, settings, choose, tolerance) if choose else None
     for_record = settings if factors is None else factors.settings
-    tracking = Evaluator(max(t.size, 1), rate_hz, for_record).evaluate(t, m, weights=True)
+    tracking = Evaluator(t.size, rate_hz, for_record).evaluate(t, m, weights=True)
     still = words.still_in_band(t, tracking)
     if still is not None:
         tracking = _without_numbers(tracking, still)
@@ -168,7 +172,7 @@ def assess(
     # Curves over frequency and what gain and delay depend on need every sample.
     raw, without_bad = (t, m), tracking
     if trusted.bad_samples:
-        t, m = bridged(t, m, rate_hz, trusted.settings)
+        t, m = bridged(t, m, rate_hz, trusted)
         without_bad = Evaluator(t.size, rate_hz, for_record).evaluate(t, m, weights=True)
     slopes, slopes_note = None, None
     # Where one delay explains measured, segments are aligned at it: bursts and drift would lead the search for another.

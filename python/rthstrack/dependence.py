@@ -9,7 +9,7 @@ noise above, and makes this cost little.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
@@ -56,12 +56,20 @@ _INDEPENDENT = 0.55
 _TIE = 0.02
 # A clock changes the delay evenly and nothing else: it leaves this share to other causes, and this change to gain.
 _CLOCK_SHARE, _CLOCK_GAIN = 0.9, 0.01
+# Nor does a course over time fit better, by so many times what noise makes of its numbers.
+_UNEVEN = 6.0
 # Local amplitude is taken as no less than this share of its root mean square.
 _STILL = 0.03
 # Octaves of amplitude are told where the delay is known to this share, and the motion is so many times its own noise.
 _KNOWN, _CLEAR, _FEW = 0.2, 10.0, 20
 # Amplitudes between which nine tenths of the energy lie.
 _ENERGY_ENDS = (0.05, 0.95)
+# A course over time has so many half waves at most, as many as blocks carry. It bends to anything, so that it must
+# explain so much more than a drift and a step, and than the causes that change with the motion.
+_HALF_WAVES, _BLOCKS_A_WAVE, _CLEARLY, _FAR = 8, 3, 0.1, 0.25
+# It takes off this share of all that one gain and one delay leave, which noise does not; so few blocks prove little
+# more. Where it takes off nearly all, they need not.
+_BENDS, _LIKELY, _NEARLY_ALL = 0.4, 0.02, 0.8
 # What does not matter gives way to the next cause, where that explains at least so much of what it does.
 _NEXT = 0.5
 # A line over frequency fits where the curve departs from it by no more than this share of delay or gain; by noise, by
@@ -106,16 +114,18 @@ class Dependence(_Result):
     """What delay and gain depend on: `kind`, and the `share` of their variation that it explains, 0 to 1.
 
     shares: of every cause, "frequency", "amplitude", "time", "clock"; they overlap, so their sum may exceed 1.
-    form: "line" (clock, drift over time, frequency), "step" (at `step_s`, from the first sample), "levels" (amplitude).
-    levels: two, by which the change is judged: low and high frequency, large and small motion, start and end, or before
-    and after a step. delay_change, gain_change: from the first to the second, as shares of delay and gain.
+    form: "line" (clock, drift over time, frequency), "step" (at `step_s`, from the first sample), "course" (over time,
+    to and fro or unevenly), "levels" (amplitude).
+    levels: two, by which the change is judged: low and high frequency, large and small motion, start and end, before
+    and after a step, or the two times of a course at which the delay, or else the gain, is farthest apart.
+    delay_change, gain_change: from the first to the second, as shares of delay and gain.
     delay_line, gain_line: over frequency, where a line fits anywhere. clock_ppm: by how much measured's clock is slow.
     """
 
     kind: Kind
     share: float
     shares: Mapping[str, float]
-    form: Literal["line", "step", "levels"]
+    form: Literal["line", "step", "course", "levels"]
     levels: tuple[Level, Level]
     delay_change: float
     gain_change: float
@@ -512,6 +522,13 @@ def dependence(
         "step": _varying(motion, [after]),
         "clock": _varying(motion, [clock_time], gains=False),
     }
+    u = (motion.time_s - motion.time_s[0]) / (motion.time_s[-1] - motion.time_s[0])
+    # Blocks half as long, as there are more numbers.
+    blocks = min(2 * motion.starts.size, _MOST_BLOCKS)
+    finer = replace(motion, starts=np.linspace(0, motion.time_s.size, blocks, endpoint=False).astype(np.intp))
+    waves = min(_HALF_WAVES, (blocks - 6) // _BLOCKS_A_WAVE)
+    course = [np.cos(math.pi * k * u) for k in range(1, waves + 1)]
+    fits["course"] = _varying(finer, course)
     constant = _solve(shape[:2], motion.measured, motion.starts).squares
     families = {"frequency": by_frequency, "amplitude": np.concatenate((shape[2:], signs)), "time": over_time}
 
@@ -531,19 +548,33 @@ def dependence(
     # Causes overlap: what counts is the mean of what each takes off alone and what it takes off last.
     last = {name: max(0.0, (left(name) - everything) / (constant - least)) for name in families}
     last["drift"] = last["step"] = last["time"]
-    weight = {name: (shares[name] + last[name]) / 2 for name in ("frequency", "amplitude", "drift", "step")}
+    plain = ("frequency", "amplitude", "drift", "step")
+    weight = {name: (shares[name] + last[name]) / 2 for name in plain}
     order = sorted(weight, key=lambda name: -weight[name])
     if shares["frequency"] > max(shares[name] for name in weight) - _TIE:
         order.remove("frequency")
         order.insert(0, "frequency")
     told = {name: shares[name] for name in ("frequency", "amplitude", "clock")}
     told["time"] = max(shares["drift"], shares["step"])
+    bends = 1 - fits["course"].squares / constant
+    beyond = shares["course"] - max(shares["drift"], shares["step"])
+    apart = shares["course"] - max(shares["frequency"], shares["amplitude"])
+    if bends > _BENDS and beyond > _CLEARLY and apart > _FAR:
+        order.insert(0, "course")
+        weight["course"] = max(weight.values())
+        told["time"] = shares["course"]
     for name in order:
         if weight[name] < _NEXT * weight[order[0]]:
             continue
-        if fits[name].odds(2) * (_PLACES if name == "step" else 1.0) > _CHANCE:
+        likely = _LIKELY if name == "course" else _CHANCE
+        if fits[name].odds(2) * (_PLACES if name == "step" else 1.0) > likely and not (
+            name == "course" and bends > _NEARLY_ALL
+        ):
             continue
-        found, levels = _told(motion, name, fits, told, place, trusted.rate_hz, response)
+        if name == "course":
+            found, levels = _over_course(motion, fits[name], told, course)
+        else:
+            found, levels = _told(motion, name, fits, told, place, trusted.rate_hz, response)
         if any(_matters(pair, trusted.rate_hz, _SURER.get(name, 1.0)) for pair in levels):
             return found
     return None
@@ -592,7 +623,7 @@ def _told(
         levels = (_along(motion, fit, (0.0,), (start, at)), _along(motion, fit, (1.0,), (at, end)))
         return _found("time", shares, "step", levels, step_s=at), [levels]
     even = abs(2 * fit.coefficients[2] / fit.coefficients[0]) < _CLOCK_GAIN
-    if even and shares["clock"] > _CLOCK_SHARE * shares["time"]:
+    if even and shares["clock"] > _CLOCK_SHARE * shares["time"] and not _is_uneven(motion, fits):
         clock = fits["clock"]
         levels = (
             _along(motion, clock, (-1.0,), (start, start), gains=False),
@@ -605,6 +636,36 @@ def _told(
         return _found("clock", shares, "line", levels, clock_ppm=ppm, clock_ppm_interval=interval), [levels]
     levels = (_along(motion, fit, (-1.0,), (start, start)), _along(motion, fit, (1.0,), (end, end)))
     return _found("time", shares, "line", levels), [levels]
+
+
+def _is_uneven(motion: _Motion, fits: Mapping[str, _Fit]) -> bool:
+    """Whether a course over time leaves less than an even drift of the delay, by far more than its numbers cost."""
+    clock, course = fits["clock"], fits["course"]
+    more = course.coefficients.size - clock.coefficients.size
+    free = max(_INDEPENDENT * motion.time_s.size - course.coefficients.size, 1.0)
+    return (clock.squares - course.squares) / more > _UNEVEN * course.squares / free
+
+
+def _over_course(
+    motion: _Motion, fit: _Fit, shares: Mapping[str, float], course: Sequence[Floats]
+) -> tuple[Dependence, list[tuple[Level, Level]]]:
+    """The two times at which the delay is farthest apart, or the gain where that varies more."""
+    basis = np.stack((np.ones_like(motion.target), *course))
+    gain, later = fit.coefficients[::2] @ basis, fit.coefficients[1::2] @ basis
+    # Where the target rests a course is free to go anywhere.
+    moves = motion.amplitude > 0.3 * float(np.sqrt(np.mean(motion.amplitude**2)))
+    ends = []
+    for values in (later, gain):
+        known = np.where(moves, values, np.nan)
+        ends.append(sorted((int(np.nanargmin(known)), int(np.nanargmax(known)))))
+    phase = [2 * math.pi * motion.f_eq * float(np.ptp(later[ends[0]])), float(np.ptp(np.log(np.abs(gain[ends[1]]))))]
+    pairs = []
+    for places in ends:
+        first, second = (
+            _along(motion, fit, [float(wave[at]) for wave in course], (float(motion.time_s[at]),) * 2) for at in places
+        )
+        pairs.append((first, second))
+    return _found("time", shares, "course", pairs[0] if phase[0] >= phase[1] else pairs[1]), pairs
 
 
 def _found(

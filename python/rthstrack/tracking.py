@@ -712,11 +712,31 @@ def evaluate_moving(
 
 
 def bridged(
-    target: NDArray[np.float64], measured: NDArray[np.float64], rate_hz: float, settings: Settings
+    target: NDArray[np.float64], measured: NDArray[np.float64], rate_hz: float, trusted: Tracking
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Both signals of one pair with straight lines, or what lies between fresh samples, in place of bad samples."""
-    found = _core.bridged(target, measured, rate_hz, settings)
-    return (target, measured) if found is None else found
+    """Both signals of a pair, bad samples as the trusted gain and delay have them, or read between fresh ones.
+
+    What is left at the good samples beside them is carried over in a straight line, so that they speak for no cause.
+    """
+    found = _core.bridged(target, measured, rate_hz, trusted.settings)
+    if found is None:
+        return target, measured
+    (target, measured), gaps = found
+    gain, delay = float(trusted.amplitude), float(trusted.delay_s) * rate_hz
+    if not math.isfinite(delay) or gain == 0:
+        return target, measured
+    index = np.arange(target.size, dtype=np.float64)
+
+    def fill(signal: NDArray[np.float64], gaps: list[tuple[int, int]], model: NDArray[np.float64]) -> None:
+        bad = np.zeros(signal.size, dtype=bool)
+        for start, end in gaps:
+            bad[start:end] = True
+        if bad.any() and not bad.all():
+            signal[bad] = model[bad] + np.interp(index[bad], index[~bad], (signal - model)[~bad])
+
+    fill(target, gaps[0], np.interp(index + delay, index, measured) / gain)
+    fill(measured, gaps[1], gain * np.interp(index - delay, index, target))
+    return target, measured
 
 
 def frequency_response(

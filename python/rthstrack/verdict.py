@@ -353,6 +353,9 @@ def _course(d: Dependence, what: str, unit: str | None, start_s: float) -> str:
     if d.form == "step":
         assert d.step_s is not None
         return f"{at(first)} until {start_s + d.step_s:.3g} s and {at(second)} from then on: it changes over time"
+    if d.form == "course":
+        times = [f"{start_s + level.where[0]:.3g} s" for level in d.levels]
+        return f"{at(first)} at {times[0]} and {at(second)} at {times[1]}: it changes over time"
     if d.kind == "clock":
         assert d.clock_ppm is not None
         assert d.clock_ppm_interval is not None
@@ -560,7 +563,7 @@ def warnings(
     found = {
         "units": _unlike_units(units, names),
         "wrap": _wrap(tracking, names),
-        "amplitude": _odd_amplitude(tracking, units),
+        "amplitude": _odd_amplitude(tracking if math.isnan(float(trusted.amplitude)) else trusted, units),
         "bad samples": _bad_samples(trusted, names),
         "clipped target": _clipped(target, names[0]) if "target" not in told else None,
         "clipped measured": _clipped(measured, names[1]) if "measured" not in told else None,
@@ -620,14 +623,16 @@ def _offset(
     """That measured stands higher or lower than target, by more than gain and delay make it."""
     if _undetermined(trusted) is not None or units[0] != units[1]:
         return None
-    off = float(measured.mean()) - float(trusted.amplitude) * float(target.mean())
+    # The median, of which a spike is no part.
+    off = float(np.median(measured - float(trusted.amplitude) * target))
     if abs(off) < _STANDS_OFF * float(target.std()):
         return None
     unit = f" {units[0]}" if units[0] else ""
     where = "higher" if off > 0 else "lower"
+    much = f"{rms_error_percent / 100:.3g} times target's rms" if rms_error_percent >= 1000 else ""
     return (
         f"{names[1]} stands {abs(off):.4g}{unit} {where} than {names[0]}, which makes the rms error "
-        f"{_percent(rms_error_percent)} %"
+        f"{much or _percent(rms_error_percent) + ' %'}"
     )
 
 

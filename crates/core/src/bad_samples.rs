@@ -114,10 +114,13 @@ impl BadFound {
     }
 }
 
-/// Both channels of a pair with their bad samples bridged, or read between fresh ones; None where there are none, or where
-/// `config` keeps them.
-pub fn bridged(pair: &Pair<'_>, config: &EvaluatorConfig) -> Option<[Vec<f64>; 2]> {
-    Alignment::examined(pair, config).map(|examination| examination.signals)
+/// Of target and measured, the stretches that are bridged.
+pub type Gaps = [Vec<Range<usize>>; 2];
+
+/// Both channels of a pair with their bad samples bridged, or read between fresh ones, and where they are bridged; None where
+/// there are none, or where `config` keeps them.
+pub fn bridged(pair: &Pair<'_>, config: &EvaluatorConfig) -> Option<([Vec<f64>; 2], Gaps)> {
+    Alignment::examined(pair, config).map(|examination| (examination.signals, examination.gaps))
 }
 
 /// How one channel lies upon the other: measured_(i + lag) ~ gain target_i + offset.
@@ -209,12 +212,21 @@ const LOOKS: usize = 5;
 /// Fewest equal values that are looked at; of a coarse converter.
 const RUN: usize = 3;
 const COARSE_RUN: usize = 8;
-/// Most of the samples that may be cut off at one level.
-const MOST_CLIPPED: f64 = 0.2;
+/// A stretch of the target that is shorter is no rest.
+const SHORT: usize = 32;
+/// Of a peak that is cut off, the excess in its first and last quarter is less than this share of that in the middle.
+const PEAKED: f64 = 0.8;
+/// An actuator that is too slow comes apart from a command with flat tops everywhere, not only there.
+const APART_OF_TARGET: f64 = 2.5;
+/// A plateau is no motion where it lies beyond all others by this share of their range, and they move half of the time.
+const BEYOND: f64 = 0.25;
+/// Most of the samples that may be cut off at one level; of a target, which is computed, fewer.
+const MOST_CLIPPED: [f64; 2] = [0.08, 0.2];
 /// More stretches than this without a jump are a specimen that sticks.
 const MOST_PARTED: usize = 3;
 /// The other channel moves by so many standard deviations of the noise while this one does not.
 const MOVES: f64 = 9.0;
+const MOVES_OF_TARGET: f64 = 5.0;
 /// A jump is so many times the steps around it.
 const JUMP: f64 = 2.0;
 /// Where the other channel jumps as well, by this share, it is motion.
@@ -227,6 +239,14 @@ const LEVELS: f64 = 4.0;
 /// Held: fewest changes; share of them at every k-th sample; samples of a value at most.
 const CHANGES: usize = 16;
 const REGULAR: f64 = 0.97;
+const REGULAR_SPACING: f64 = 0.94;
+/// So many values, or fewer, are levels of a command; so many spacings alike are even times.
+const FEW_LEVELS: usize = 8;
+const EVEN_TIMES: f64 = 0.8;
+/// An end is a spike where it leaves by so many times what the sample beside it does, and by so many standard deviations.
+const OF_END: f64 = 4.0;
+const SPIKE_BY_END: f64 = 25.0;
+const OF_DEVIATION: f64 = 0.01;
 const LONGEST_HOLD: usize = 64;
 /// More pairs of equal values than this share are a converter's.
 const OF_CONVERTER: f64 = 0.002;
@@ -269,13 +289,15 @@ impl Examination {
         View { target, measured, origin: 0, gaps: [&self.gaps[0], &self.gaps[1]] }
     }
 
-    /// Looks at both channels; whether there are bad samples. `about` is asked at most once, and only where it matters.
-    pub(crate) fn examine(&mut self, signals: [&[f64]; 2], about: impl FnOnce() -> Option<About>) -> bool {
+    /// Looks at both channels; whether there are bad samples. `about` is asked at most once, of the signals without what is
+    /// far off, and only where it matters.
+    pub(crate) fn examine(&mut self, signals: [&[f64]; 2], about: impl FnOnce([&[f64]; 2]) -> Option<About>) -> bool {
         self.found = BadFound::NONE;
-        let looks = signals.map(Look::at);
-        if looks.iter().all(|look| !look.closer) {
+        let first = signals.map(Sight::of);
+        if first.iter().all(|sight| !sight.asks_for_more()) {
             return false;
         }
+        let mut looks = [0, 1].map(|c| Look::at(signals[c], first[c]));
         for (own, signal) in self.signals.iter_mut().zip(signals) {
             own.clear();
             own.extend_from_slice(signal);
@@ -284,25 +306,40 @@ impl Examination {
             marks.clear();
             marks.resize(signal.len(), GOOD);
         }
-        let held = [0, 1].map(|c| if looks[c].repeats { held(signals[c], looks[c].level) } else { None });
-        let repeats = [0, 1].map(|c| looks[c].repeats && held[c].is_none());
+        let held = [0, 1].map(|c| if looks[c].sight.repeats { held(signals[c], looks[c].level) } else { None });
+        for (look, (held, signal)) in looks.iter_mut().zip(held.iter().zip(signals)) {
+            if let Some(held) = held {
+                look.noise = look.noise.max(noise_of_fresh(signal, held));
+            }
+        }
+        let repeats = [0, 1].map(|c| looks[c].sight.repeats && held[c].is_none());
+        for c in (0..2).filter(|&c| repeats[c]) {
+            if mark_plateaus(signals[c], &mut self.marks[c], &looks[c]) {
+                bridge(&mut self.signals[c], &self.marks[c], 0..signals[c].len());
+                let sight = Sight { repeats: true, ..Sight::of(&self.signals[c]) };
+                looks[c] = Look::at(&self.signals[c], sight);
+            }
+        }
         let mut about = Some(about);
         let mut found = None;
-        let mut ask = || *found.get_or_insert_with(|| about.take().and_then(|about| about()));
-        if repeats != [false; 2]
-            && let Some(about) = ask()
-        {
-            for c in (0..2).filter(|&c| repeats[c]) {
-                self.mark_runs(c, signals, &about, &looks);
-                bridge(&mut self.signals[c], &self.marks[c], 0..signals[c].len());
+        if repeats != [false; 2] {
+            found = about.take().and_then(|about| about([&self.signals[0], &self.signals[1]]));
+            if let Some(about) = &found {
+                for c in (0..2).filter(|&c| repeats[c]) {
+                    self.mark_runs(c, signals, about, &looks);
+                    bridge(&mut self.signals[c], &self.marks[c], 0..signals[c].len());
+                }
             }
         }
         let mut spiked = false;
-        for c in (0..2).filter(|&c| held[c].is_none() && looks[c].stands_out) {
+        for c in (0..2).filter(|&c| held[c].is_none() && (looks[c].sight.stands_out || looks[c].sight.at_ends)) {
             spiked |= self.mark_spikes(c, &looks[c]);
         }
-        if spiked && let Some(about) = ask() {
-            self.unmark_shared_spikes(signals, &about);
+        if spiked {
+            found = found.or_else(|| about.take().and_then(|about| about([&self.signals[0], &self.signals[1]])));
+            if let Some(about) = &found {
+                self.unmark_shared_spikes(signals, about);
+            }
         }
         for c in 0..2 {
             match held[c] {
@@ -318,6 +355,11 @@ impl Examination {
         let (signal, marks) = (&mut self.signals[channel], &mut self.marks[channel]);
         let n = signal.len();
         let mut any = false;
+        for i in ends_that_leave(signal, look).into_iter().flatten() {
+            marks[i] = 1 + BadKind::Spike as u8;
+            bridge(signal, marks, i..i + 1);
+            any = true;
+        }
         let blocks = n.div_ceil(BLOCK);
         for block in 0..blocks {
             let own = block * BLOCK..((block + 1) * BLOCK).min(n);
@@ -384,6 +426,12 @@ impl Examination {
                     continue;
                 }
                 let height = signals[c][i] - self.signals[c][i];
+                // Beside an end it may as well have been a step.
+                let at_end = i == 0 || i + 1 == signals[c].len();
+                if at_end && other.jumps(i, SHARED * height.abs()) {
+                    self.marks[c][i] = GOOD;
+                    continue;
+                }
                 // At the same instant in both it is in the wiring, or the earth; of that nothing is left out.
                 let alike = |at: isize| {
                     at >= 1
@@ -411,7 +459,9 @@ impl Examination {
         let other = Other::of(channel, signals, about);
         let (own, beside) = (&looks[channel], &looks[1 - channel]);
         let noise = own.noise.max(other.scale.abs() * beside.noise);
-        let least = (MOVES * noise).max(LEVELS * own.level).max(LEVELS * other.scale.abs() * beside.level);
+        // Numbers of a computed target are as fine as any: chance makes no two equal.
+        let moves = if channel == 0 && own.level == 0.0 && own.equal < 0.1 { MOVES_OF_TARGET } else { MOVES };
+        let least = (moves * noise).max(LEVELS * own.level).max(LEVELS * other.scale.abs() * beside.level);
         let apart = (APART * other.apart).max(APART_OF_MOTION * own.deviation);
         // Of a coarse converter a few equal values mean nothing.
         let coarse = own.level > 0.05 * own.noise || own.chance > OF_CONVERTER;
@@ -420,7 +470,7 @@ impl Examination {
         let by_chance = 1 + ((1e-5 / signal.len() as f64).ln() / chance.ln()).ceil() as usize;
         let shortest = match own.level {
             0.0 => RUN,
-            _ if coarse => by_chance.max(COARSE_RUN),
+            _ if coarse => COARSE_RUN,
             _ => by_chance.clamp(RUN, COARSE_RUN),
         };
         let mut sticks = 0;
@@ -432,18 +482,25 @@ impl Examination {
         while a < n {
             let value = signal[a];
             let mut b = a + 1;
-            while b < n && signal[b] == value {
+            // Rounding is no change.
+            while b < n && (signal[b] - value).abs() <= 1e-13 * own.deviation {
                 b += 1;
             }
-            if b - a >= shortest {
+            // Of a coarse converter's noise, equal values tell something only where the other one moves by more than noise.
+            let may_be_chance = coarse && b - a < by_chance;
+            // The first of a frozen stretch is still right, but where the record starts with it nobody knows.
+            let second = if a == 0 { 0 } else { a + 1 };
+            if b - a >= shortest && marks[a] == GOOD {
                 let run = Run { signal, other: &other, range: a..b, noise, level: own.level };
                 let by_noise = !coarse && own.is_noisy && own.noise > 1e-9 * own.deviation && own.equal < 0.1;
                 let side = [low, high].iter().position(|extreme| *extreme == value);
                 if let Some(side) = side
-                    && run.goes_beyond(if side == 0 { -1.0 } else { 1.0 }, own)
+                    && run.goes_beyond(if side == 0 { -1.0 } else { 1.0 }, own, channel == 0)
                 {
                     clipped[side] = true;
-                } else if run.moved() > 0.5 * least {
+                } else if run.moved() > if may_be_chance { least } else { 0.5 * least }
+                    && (channel == 1 || b - a < SHORT || run.goes_on(0.25 * least))
+                {
                     let mut ends = run.ends();
                     // A command that steps is followed in the end.
                     let left_alone = channel == 1 || run.is_left_alone(ends.jumps);
@@ -452,7 +509,6 @@ impl Examination {
                     }
                     // In numbers as fine as these nothing is equal by chance.
                     let by_fineness = channel == 0 && left_alone && !coarse && own.equal < 0.1 && run.moved() > least;
-                    // The first of a frozen stretch is still right.
                     match ends {
                         Ends { enters: true, leaves, .. }
                             if leaves || run.parts(least.max(2.0 * other.apart), channel == 0) =>
@@ -460,7 +516,7 @@ impl Examination {
                             marks[a..b].fill(1 + BadKind::Dropout as u8);
                         }
                         Ends { enters: false, leaves: true, jumps } => {
-                            let (from, kind) = if jumps { (a, BadKind::Dropout) } else { (a + 1, BadKind::Frozen) };
+                            let (from, kind) = if jumps { (a, BadKind::Dropout) } else { (second, BadKind::Frozen) };
                             marks[from..b].fill(1 + kind as u8);
                         }
                         Ends { enters: false, leaves: false, jumps: true }
@@ -471,12 +527,14 @@ impl Examination {
                         {
                             marks[a..b].fill(1 + BadKind::Dropout as u8);
                         }
-                        Ends { enters: false, leaves: false, .. } if a > 0 => {
+                        Ends { enters: false, leaves: false, .. }
+                            if a > 0 || (channel == 1 && run.moved() > 2.0 * own.deviation) =>
+                        {
                             if by_fineness || (by_noise && run.is_alone()) {
-                                marks[a + 1..b].fill(1 + BadKind::Frozen as u8);
+                                marks[second..b].fill(1 + BadKind::Frozen as u8);
                             } else if run.parts(least.max(apart), channel == 0) {
                                 if let Some(slot) = parted.get_mut(sticks) {
-                                    *slot = Some(a..b);
+                                    *slot = Some(second..b);
                                 }
                                 sticks += 1;
                             } else {
@@ -486,7 +544,8 @@ impl Examination {
                         _ => {}
                     }
                 } else if by_noise && b - a < BLOCK && run.is_alone() {
-                    let (from, kind) = if run.ends().jumps { (a, BadKind::Dropout) } else { (a + 1, BadKind::Frozen) };
+                    let jumps = run.ends().jumps;
+                    let (from, kind) = if jumps { (a, BadKind::Dropout) } else { (second, BadKind::Frozen) };
                     marks[from..b].fill(1 + kind as u8);
                 }
             }
@@ -495,12 +554,12 @@ impl Examination {
         // One that sticks does so again and again.
         if sticks <= MOST_PARTED {
             for run in parted.into_iter().flatten() {
-                marks[run.start + 1..run.end].fill(1 + BadKind::Frozen as u8);
+                marks[run].fill(1 + BadKind::Frozen as u8);
             }
         }
         for (extreme, _) in [low, high].into_iter().zip(clipped).filter(|(_, clipped)| *clipped) {
             // A shape with flat tops rests there for long.
-            if signal.iter().filter(|v| **v == extreme).count() as f64 > MOST_CLIPPED * n as f64 {
+            if signal.iter().filter(|v| **v == extreme).count() as f64 > MOST_CLIPPED[channel] * n as f64 {
                 continue;
             }
             for i in (0..n).filter(|&i| signal[i] == extreme) {
@@ -572,9 +631,32 @@ impl Examination {
     }
 }
 
-/// What one channel looks like at first sight.
+/// What is seen of a channel in one pass.
+#[derive(Debug, Clone, Copy)]
+struct Sight {
+    stands_out: bool,
+    /// The first or the last sample may stand out.
+    at_ends: bool,
+    repeats: bool,
+}
+
+impl Sight {
+    fn of(signal: &[f64]) -> Self {
+        let (stands_out, threes, equals) = Arch::new().dispatch(FirstSight(signal));
+        // A value held for two samples has no three alike.
+        let repeats = threes > 0 || 3 * equals > signal.len();
+        Self { stands_out, at_ends: leaves_ends(signal) != [false; 2], repeats }
+    }
+
+    fn asks_for_more(&self) -> bool {
+        self.stands_out || self.at_ends || self.repeats
+    }
+}
+
+/// What one channel looks like, by a closer look.
 #[derive(Debug, Clone, Copy)]
 struct Look {
+    sight: Sight,
     /// Standard deviation of the noise, by the median of |g|.
     noise: f64,
     /// It is noise indeed, and not the motion's.
@@ -588,59 +670,49 @@ struct Look {
     peak: f64,
     low: f64,
     high: f64,
-    stands_out: bool,
-    repeats: bool,
-    /// It needs a closer look.
-    closer: bool,
 }
 
 impl Look {
-    fn at(signal: &[f64]) -> Self {
+    fn at(signal: &[f64], sight: Sight) -> Self {
         let n = signal.len();
-        let (stands, threes, equals) = Arch::new().dispatch(FirstSight(signal));
-        // A value held for two samples has no three alike.
-        let repeats = threes > 0 || 3 * equals > n;
-        let closer = stands || repeats;
-        let (mut noise, mut level, mut deviation, mut is_noisy) = (0.0, 0.0, 0.0, false);
-        let (mut chance, mut equal) = (0.0, 0.0);
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        if closer {
-            for v in signal {
-                low = low.min(*v);
-                high = high.max(*v);
-            }
-            let mean = sums::sum(signal) / n as f64;
-            deviation = (sums::spread(signal, mean) / n as f64).sqrt();
-            let changes = signal.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|s| *s > 1e-13 * (high - low));
-            level = changes.fold(f64::INFINITY, f64::min);
-            // Just two equal values one after the other: of a converter, not of a sensor that stands.
-            let twos = signal.windows(4).filter(|w| w[1] == w[2] && w[0] != w[1] && w[3] != w[2]).count();
-            let equals = signal.windows(2).filter(|w| w[0] == w[1]).count();
-            equal = equals as f64 / n as f64;
-            chance = twos as f64 / n as f64;
-            let of_converter = chance > OF_CONVERTER;
-            level = if of_converter || is_converter(signal, level) { level } else { 0.0 };
-            chance = if of_converter { equal } else { chance };
-            // One block in so many is enough for what is typical.
-            let every = (n / BLOCK / 64).max(1) * BLOCK;
-            let mut levels = [0.0; 128];
-            let mut k = 0;
-            for start in (0..n.saturating_sub(BLOCK - 1)).step_by(every).take(levels.len()) {
-                levels[k] = median(signal, &(start..start + BLOCK), fourth) / (MEDIAN * OF_G);
-                k += 1;
-            }
-            noise = middle(&mut levels[..k]);
-            let mut bends = [0.0; 128];
-            let mut k = 0;
-            for start in (0..n.saturating_sub(BLOCK - 1)).step_by(every).take(bends.len()) {
-                bends[k] = median(signal, &(start..start + BLOCK), second) / (MEDIAN * OF_H);
-                k += 1;
-            }
-            is_noisy = noise > 0.5 * middle(&mut bends[..k]);
+        let (low, high) = signal.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+        let mean = sums::sum(signal) / n as f64;
+        let deviation = (sums::spread(signal, mean) / n as f64).sqrt();
+        let changes = signal.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|s| *s > 1e-13 * (high - low));
+        let level = changes.fold(f64::INFINITY, f64::min);
+        // Just two equal values one after the other: of a converter, not of a sensor that stands.
+        let twos = signal.windows(4).filter(|w| w[1] == w[2] && w[0] != w[1] && w[3] != w[2]).count();
+        let equals = signal.windows(2).filter(|w| w[0] == w[1]).count();
+        let (equal, chance) = (equals as f64 / n as f64, twos as f64 / n as f64);
+        let of_converter = chance > OF_CONVERTER;
+        let level = if of_converter || is_converter(signal, level) { level } else { 0.0 };
+        let noise = typical(signal, fourth) / OF_G;
+        Self {
+            sight,
+            noise,
+            is_noisy: noise > 0.5 * typical(signal, second) / OF_H,
+            level,
+            chance: if of_converter { equal } else { chance },
+            equal,
+            deviation,
+            peak: low.abs().max(high.abs()),
+            low,
+            high,
         }
-        let peak = low.abs().max(high.abs());
-        Self { noise, is_noisy, level, chance, equal, deviation, peak, low, high, stands_out: stands, repeats, closer }
     }
+}
+
+/// The standard deviation of what is normal of a block, by medians; one block in so many is enough.
+fn typical(signal: &[f64], spread: fn(&[f64], usize) -> f64) -> f64 {
+    let n = signal.len();
+    let every = (n / BLOCK / 64).max(1) * BLOCK;
+    let mut blocks = [0.0; 128];
+    let mut k = 0;
+    for start in (0..n.saturating_sub(BLOCK - 1)).step_by(every).take(blocks.len()) {
+        blocks[k] = median(signal, &(start..start + BLOCK), spread) / MEDIAN;
+        k += 1;
+    }
+    middle(&mut blocks[..k])
 }
 
 /// Whether changes are whole multiples of `level`.
@@ -722,19 +794,54 @@ impl Run<'_> {
         (high - low).max(0.0)
     }
 
+    /// Whether the other channel moves by more than `least`, and than noise does, in the second half too, and where the record
+    /// ends with this stretch by more than half of the first: what rests lets the other one come to rest.
+    fn goes_on(&self, least: f64) -> bool {
+        let Range { start: a, end: b } = self.range;
+        let cut = (self.other.shift.unsigned_abs() + 2).min((b - a) / 4);
+        let half = a + (b - a) / 2;
+        let extent = |range: Range<usize>| {
+            let ends = (f64::INFINITY, f64::NEG_INFINITY);
+            let (low, high) = self.others(range).fold(ends, |(l, h), v| (l.min(v), h.max(v)));
+            (high - low).max(0.0)
+        };
+        let (first, second) = (extent(a..half), extent(half..b - cut));
+        // What noise does in so many samples.
+        let at_rest = self.noise * (1.0 + 2.0 * (2.0 * ((b - half) as f64 + 1.0).ln()).sqrt());
+        second > least.max(at_rest) && (b < self.signal.len() || second > 0.5 * first)
+    }
+
+    /// Of an excess beyond the extreme: that it is highest in the middle, as of a peak that is cut off; one that comes late and
+    /// overshoots is highest at an end.
+    fn is_peak(&self, side: f64) -> bool {
+        let Range { start: a, end: b } = self.range;
+        let quarter = (b - a) / 4;
+        if quarter < 2 {
+            return true;
+        }
+        let value = self.signal[a];
+        let mean = |range: Range<usize>| {
+            let (n, sum) = self.others(range).fold((0.0, 0.0), |(n, sum), v| (n + 1.0, sum + side * (v - value)));
+            sum / f64::max(n, 1.0)
+        };
+        let middle = mean(a + quarter..b - quarter);
+        mean(a..a + quarter) < PEAKED * middle && mean(b - quarter..b) < PEAKED * middle
+    }
+
     /// At a channel's extreme: whether the other one goes on beyond it and comes back, as peaks do that are cut off.
-    fn goes_beyond(&self, side: f64, own: &Look) -> bool {
+    fn goes_beyond(&self, side: f64, own: &Look, of_target: bool) -> bool {
         let Range { start: a, end: b } = self.range;
         if a < 4 || b + 4 > self.signal.len() {
             return false;
         }
         let value = self.signal[a];
         let (n, sum) = self.others(self.inner()).fold((0.0, 0.0), |(n, sum), v| (n + 1.0, sum + side * (v - value)));
-        let least = (1.5 * self.noise).max(0.005 * own.deviation).max(self.other.apart).max(2.0 * self.level);
+        let apart = if of_target { APART_OF_TARGET * self.other.apart } else { self.other.apart };
+        let least = (1.5 * self.noise).max(0.005 * own.deviation).max(apart).max(2.0 * self.level);
         // It comes to its end as fast as it leaves it; one that sticks comes to rest.
         let (comes, leaves) = (self.signal[a - 1] - self.signal[a - 4], self.signal[b + 3] - self.signal[b]);
         let alike = side * comes > 0.0 && side * leaves < 0.0 && comes.abs() > 0.25 * leaves.abs();
-        alike && sum > n * least && self.moved() > least
+        alike && sum > n * least && self.moved() > least && self.is_peak(side)
     }
 
     /// In its second half the other channel is nearer to what is before and after: it has not followed there.
@@ -813,10 +920,11 @@ struct Held {
     phase: usize,
 }
 
-/// Whether values change at every k-th sample only.
+/// Whether values change at every k-th sample only, at rest as in motion.
 fn held(signal: &[f64], level: f64) -> Option<Held> {
     let mut spacings = [0usize; LONGEST_HOLD + 1];
     let (mut changes, mut of_one, mut last) = (0usize, 0usize, None);
+    let mut values = Few::default();
     for i in 1..signal.len() {
         let step = (signal[i] - signal[i - 1]).abs();
         if step == 0.0 {
@@ -824,27 +932,149 @@ fn held(signal: &[f64], level: f64) -> Option<Held> {
         }
         changes += 1;
         of_one += usize::from(step <= 1.5 * level);
+        values.add(signal[i]);
         if let Some(last) = last.replace(i)
             && i - last <= LONGEST_HOLD
         {
             spacings[i - last] += 1;
+            // Most are not held: seen soon.
+            if spacings[1] > CHANGES && spacings[1] * 16 > changes {
+                return None;
+            }
         }
     }
-    // Two levels by turns are a square wave.
+    // A few levels by turns are a command that steps.
+    if changes < CHANGES || !values.are_many() {
+        return None;
+    }
+    // Even steps at even times are stairs, or a coarse converter on a ramp.
     let steps = || signal.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|step| *step > 0.0);
     let usual = steps().nth(changes / 2).unwrap_or(0.0);
     let alike = steps().filter(|step| (step - usual).abs() < 0.01 * usual).count();
-    if 2 * alike > changes || changes < CHANGES || of_one as f64 > OF_ONE_LEVEL * changes as f64 {
+    let even = spacings.iter().max().is_some_and(|most| *most as f64 > EVEN_TIMES * changes as f64);
+    if even && (2 * alike > changes || of_one as f64 > OF_ONE_LEVEL * changes as f64) {
         return None;
     }
-    let every = (1..=LONGEST_HOLD).max_by_key(|&k| spacings[k])?;
-    if every < 2 || 2 * spacings[every] < changes {
-        return None;
+    let short: usize = spacings.iter().sum();
+    for every in (2..=LONGEST_HOLD).rev() {
+        let whole: usize = spacings.iter().step_by(every).sum();
+        if short == 0 || (whole as f64) < REGULAR_SPACING * short as f64 {
+            continue;
+        }
+        let mut phases = [0usize; LONGEST_HOLD];
+        (1..signal.len()).filter(|&i| signal[i] != signal[i - 1]).for_each(|i| phases[i % every] += 1);
+        let phase = (0..every).max_by_key(|&p| phases[p])?;
+        if phases[phase] as f64 >= REGULAR * changes as f64 {
+            return Some(Held { every, phase });
+        }
     }
-    let mut phases = [0usize; LONGEST_HOLD];
-    (1..signal.len()).filter(|&i| signal[i] != signal[i - 1]).for_each(|i| phases[i % every] += 1);
-    let phase = (0..every).max_by_key(|&p| phases[p])?;
-    (phases[phase] as f64 >= REGULAR * changes as f64).then_some(Held { every, phase })
+    None
+}
+
+/// Standard deviation of the noise of fresh values, by the median of |g| over them.
+fn noise_of_fresh(signal: &[f64], held: &Held) -> f64 {
+    let Held { every, phase } = *held;
+    let fresh = (signal.len() - phase) / every;
+    let mut found = [0.0; 1024];
+    let step = (fresh / found.len()).max(1);
+    let mut k = 0;
+    for j in (2..fresh.saturating_sub(2)).step_by(step).take(found.len()) {
+        let around: [f64; 5] = std::array::from_fn(|m| signal[phase + (j + m - 2) * every]);
+        found[k] = fourth(&around, 2).abs();
+        k += 1;
+    }
+    // At rest on one step of a converter most are zero; then the larger half tells.
+    let half = middle(&mut found[..k]);
+    let typical = if half > 0.0 { half } else { middle_of_moving(&mut found[..k]) };
+    typical / (MEDIAN * OF_G)
+}
+
+/// The middle of the values that are not zero.
+fn middle_of_moving(values: &mut [f64]) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    let first = values.partition_point(|v| *v == 0.0);
+    middle(&mut values[first..])
+}
+
+/// Whether more than a few different values were seen.
+#[derive(Default)]
+struct Few {
+    values: [f64; FEW_LEVELS],
+    n: usize,
+}
+
+impl Few {
+    fn add(&mut self, value: f64) {
+        if self.n <= FEW_LEVELS && !self.values[..self.n.min(FEW_LEVELS)].contains(&value) {
+            if let Some(slot) = self.values.get_mut(self.n) {
+                *slot = value;
+            }
+            self.n += 1;
+        }
+    }
+
+    fn are_many(&self) -> bool {
+        self.n > FEW_LEVELS
+    }
+}
+
+/// Stretches of one value far beyond all others, of a channel that moves: no other channel need be asked.
+fn mark_plateaus(signal: &[f64], marks: &mut [u8], look: &Look) -> bool {
+    let (mut low, mut high, mut n, mut moves) = (f64::INFINITY, f64::NEG_INFINITY, 0usize, 0usize);
+    let is_inner = |v: f64| v != look.low && v != look.high;
+    for (i, &v) in signal.iter().enumerate().filter(|(_, v)| is_inner(**v)) {
+        (low, high, n) = (low.min(v), high.max(v), n + 1);
+        moves += usize::from(i > 0 && v != signal[i - 1]);
+    }
+    if 2 * n < signal.len() || 2 * moves < n || high <= low {
+        return false;
+    }
+    let least = BEYOND * (high - low);
+    let beyond = [look.low < low - least, look.high > high + least];
+    let mut any = false;
+    let mut a = 0;
+    while beyond != [false; 2] && a < signal.len() {
+        let value = signal[a];
+        let b = a + signal[a..].iter().take_while(|v| **v == value).count();
+        if b - a >= RUN && ((beyond[0] && value == look.low) || (beyond[1] && value == look.high)) {
+            marks[a..b].fill(1 + BadKind::Dropout as u8);
+            any = true;
+        }
+        a = b;
+    }
+    any
+}
+
+/// The first and the last sample less the parabola through the three beside it, and how far the same leaves the next one: for
+/// each end.
+fn of_ends(x: &[f64]) -> [(f64, f64); 2] {
+    let n = x.len();
+    let leaves = |x: [f64; 5]| {
+        let third = |k: usize| (x[k] - 3.0 * x[k + 1] + 3.0 * x[k + 2] - x[k + 3]).abs();
+        (third(0), third(1))
+    };
+    if n < 16 {
+        return [(0.0, 0.0); 2];
+    }
+    [leaves(std::array::from_fn(|k| x[k])), leaves(std::array::from_fn(|k| x[n - 1 - k]))]
+}
+
+/// Whether an end leaves by far more than the sample beside it, and than the noise there.
+fn leaves_ends(x: &[f64]) -> [bool; 2] {
+    let n = x.len();
+    let ends = of_ends(x);
+    let blocks = [0..BLOCK.min(n), n.saturating_sub(BLOCK)..n];
+    std::array::from_fn(|side| {
+        let (own, next) = ends[side];
+        own > OF_END * next && own > SPIKE_BY_END * median(x, &blocks[side], fourth) / (MEDIAN * OF_G)
+    })
+}
+
+/// The ends that are spikes.
+fn ends_that_leave(x: &[f64], look: &Look) -> [Option<usize>; 2] {
+    let least = (4.0 * LEVELS * look.level).max(OF_DEVIATION * look.deviation);
+    let (ends, leave) = (of_ends(x), leaves_ends(x));
+    std::array::from_fn(|side| (leave[side] && ends[side].0 > least).then_some(if side == 0 { 0 } else { x.len() - 1 }))
 }
 
 /// g about sample i, which has two neighbours on either side.

@@ -97,10 +97,10 @@ impl Settings {
     }
 }
 
-/// target, measured
-type Signals<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
+/// target, measured; and of each, from and to of what is bridged
+type Bridged<'py> = ([Bound<'py, PyArray1<f64>>; 2], [Vec<(usize, usize)>; 2]);
 
-/// Both signals with their bad samples bridged; nothing where there are none.
+/// Both signals with their bad samples bridged, and where; nothing where there are none.
 #[pyfunction]
 pub(crate) fn bridged<'py>(
     py: Python<'py>,
@@ -108,10 +108,12 @@ pub(crate) fn bridged<'py>(
     measured: PyReadonlyArray1<'py, f64>,
     rate_hz: f64,
     settings: Settings,
-) -> PyResult<Option<Signals<'py>>> {
+) -> PyResult<Option<Bridged<'py>>> {
     let pair = Pair::new(target.as_slice()?, measured.as_slice()?, rate_hz).map_err(|e| to_py(py, &e))?;
     let found = rthstrack::bridged(&pair, &settings.config(py)?);
-    Ok(found.map(|[target, measured]| (target.into_pyarray(py), measured.into_pyarray(py))))
+    Ok(found.map(|(signals, gaps)| {
+        (signals.map(|s| s.into_pyarray(py)), gaps.map(|g| g.into_iter().map(|gap| (gap.start, gap.end)).collect()))
+    }))
 }
 
 /// The checked plan for records of one length and rate.

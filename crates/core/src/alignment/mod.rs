@@ -485,7 +485,10 @@ impl Alignment {
         start: usize,
         expected: Option<f64>,
     ) -> Tracking {
-        let about = || About::find(&self.search, &mut state.search, view, start);
+        let about = |signals: [&[f64]; 2]| {
+            let [target, measured] = signals;
+            About::find(&self.search, &mut state.search, &View { target, measured, ..*view }, start)
+        };
         if !examination.examine([view.target, view.measured], about) {
             return self.estimate(state, view, start, expected);
         }
@@ -1574,7 +1577,10 @@ impl Alignment {
         let search = Search::new(pair.n_samples(), pair.rate_hz(), config.max_delay_s);
         let view = View::whole(pair);
         let mut examination = Examination::default();
-        let about = || About::find(&search, &mut search.state(), &view, 0);
+        let about = |signals: [&[f64]; 2]| {
+            let [target, measured] = signals;
+            About::find(&search, &mut search.state(), &View { target, measured, ..view }, 0)
+        };
         (config.bad_samples == BadSamples::LeaveOut && examination.examine([view.target, view.measured], about))
             .then_some(examination)
     }
