@@ -114,8 +114,8 @@ def a_run(**changes: object) -> Run:
         "force": 1e6 * signal,
         "displacement": signal[:, None],
         "ground_motion": np.zeros(n),
-        "ground_motion_name": "still",
-        "ground_motion_notes": ("as recorded", "scaled by 2"),
+        "motion_name": "still",
+        "motion_notes": ("as recorded", "scaled by 2"),
         "steps_per_sample": 4,
         "error_estimate": 1e-7,
         "critical_delay": None,
@@ -423,11 +423,11 @@ def test_a_file_is_replaced_whole_or_left_as_it_was(tmp_path: Path, monkeypatch:
 
     monkeypatch.setattr(h5py.Group, "create_dataset", full)
     with pytest.raises(RecordingError, match=r"run\.h5: cannot be written: No space left on device"):
-        write_run(a_run(ground_motion_name="other"), path)
+        write_run(a_run(motion_name="other"), path)
     monkeypatch.undo()
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
-    write_run(a_run(ground_motion_name="other"), path)
+    write_run(a_run(motion_name="other"), path)
     with h5py.File(path, "r") as file:
         assert file.attrs["ground_motion_name"] == "other"
 

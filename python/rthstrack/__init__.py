@@ -29,6 +29,7 @@ from rthstrack.monitor import Monitor, MonitorSettings, Readings, causal_decimat
 from rthstrack.recording import Channel, Recording, propose_pair, read_recording
 from rthstrack.report import write_report
 from rthstrack.studies import Study, study
+from rthstrack.target_motion import RecordedTarget, SineTarget, SweepTarget, read_target
 from rthstrack.tracking import (
     BadSamples,
     Evaluator,
@@ -80,6 +81,7 @@ __all__ = [
     "MonitorSettings",
     "MovingTracking",
     "Readings",
+    "RecordedTarget",
     "Recording",
     "RecordingError",
     "RthstrackError",
@@ -87,7 +89,9 @@ __all__ = [
     "SettingError",
     "Settings",
     "SignalError",
+    "SineTarget",
     "Study",
+    "SweepTarget",
     "Tracking",
     "UnstableError",
     "VirtualTest",
@@ -110,6 +114,7 @@ __all__ = [
     "read_configuration",
     "read_ground_motion",
     "read_recording",
+    "read_target",
     "record",
     "simulate",
     "simulate_many",
