@@ -26,6 +26,7 @@ from rthstrack.factors import (
 )
 from rthstrack.ground_motion import GroundMotion, list_records, read_ground_motion, record, synthetic_ground_motion
 from rthstrack.monitor import Monitor, MonitorSettings, Readings, causal_decimate
+from rthstrack.presets import PRESETS, preset
 from rthstrack.recording import Channel, Recording, propose_pair, read_recording
 from rthstrack.report import write_report
 from rthstrack.studies import Study, study
@@ -60,6 +61,7 @@ from rthstrack.virtual_test import (
 )
 
 __all__ = [
+    "PRESETS",
     "Assessment",
     "BadSamples",
     "Channel",
@@ -110,6 +112,7 @@ __all__ = [
     "indices",
     "key_frequencies",
     "list_records",
+    "preset",
     "propose_pair",
     "read_configuration",
     "read_ground_motion",
