@@ -98,7 +98,7 @@ def _of_test(run: Run, config: str) -> Iterable[tuple[str, str]]:
     n, frequencies = run.n_samples, run.test.structure.natural_frequencies_hz
     yield "test", f"{config}: {n} samples at {run.rate_hz:g} Hz ({(n - 1) / run.rate_hz:g} s)"
     if run.ground_motion is None:
-        yield "target", run.motion_name
+        yield "target", getattr(run.target_motion, "source", run.motion_name)
         yield from (("", note) for note in run.motion_notes)
         return
     yield "ground motion", f"{run.motion_name}, peak {np.abs(run.ground_motion).max():.4g} m/s2"
