@@ -247,6 +247,10 @@ impl<'a> Equations<'a> {
     #[inline(always)]
     fn look<const ONE: bool>(&mut self, time: f64, reach: f64, h: f64) {
         if let (false, Some((course, now))) = (ONE, &mut self.course) {
+            // What was found at the end of a step stands at the start of the next.
+            if reach == 0.0 && time > 0.0 {
+                return;
+            }
             let (time, rate) = (time + reach * h, self.test.config.rate_hz);
             *now = course.at(time * rate);
             for (rig, actuator) in self.rigs.iter_mut().zip(&self.test.config.actuators) {

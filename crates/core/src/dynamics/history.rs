@@ -63,6 +63,9 @@ pub(crate) fn quintic(s: f64, h: f64, from: Motion, to: Motion) -> Motion {
     }
 }
 
+/// How far rounding may take the time of a sample from it, in samples.
+const ROUNDING: f64 = 1e-9;
+
 /// A target that is given, sample by sample; at rest before its first.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Course<'a> {
@@ -78,16 +81,15 @@ impl<'a> Course<'a> {
     /// The motion at a place counted in samples: between two of them the polynomial through both.
     #[inline]
     pub(crate) fn at(&self, place: f64) -> Motion {
-        // A sample is itself, however its time was rounded.
-        let near = place.round();
-        let place = if (place - near).abs() < 1e-9 { near } else { place };
-        if place < 0.0 {
+        if place < -ROUNDING {
             return Motion::default();
         }
-        let whole = place as usize;
+        // A sample is itself, however its time was rounded.
+        let whole = (place + ROUNDING) as usize;
+        let s = place - whole as f64;
         match (self.samples.get(whole), self.samples.get(whole + 1)) {
-            (Some(from), _) if place == whole as f64 => *from,
-            (Some(from), Some(to)) => quintic(place - whole as f64, self.step_s, *from, *to),
+            (Some(from), _) if s < ROUNDING => *from,
+            (Some(from), Some(to)) => quintic(s, self.step_s, *from, *to),
             _ => Motion::default(),
         }
     }
