@@ -228,7 +228,7 @@ def test_the_table_of_a_test_is_read_back_as_the_same_test(text: str) -> None:
     written = json.dumps(to_table(test, motion, duration_s), allow_nan=False)
     again = configuration_from(json.loads(written))
     assert_same(test, again.test)
-    assert (again.ground_motion, again.duration_s) == (motion, duration_s)
+    assert (again.motion, again.duration_s) == (motion, duration_s)
     assert_same(test, virtual_test_from(json.loads(written)))
 
 

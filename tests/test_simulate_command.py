@@ -23,6 +23,7 @@ from rthstrack.errors import RecordingError, SignalError, UnstableError
 from rthstrack.ground_motion import ground_motion_from, synthetic_ground_motion
 from rthstrack.recording import propose_pair, read_recording
 from rthstrack.run_file import read_run_test, write_run
+from rthstrack.target_motion import SineTarget, SweepTarget
 from rthstrack.virtual_test import (
     Actuator,
     Converter,
@@ -114,8 +115,8 @@ def a_run(**changes: object) -> Run:
         "force": 1e6 * signal,
         "displacement": signal[:, None],
         "ground_motion": np.zeros(n),
-        "ground_motion_name": "still",
-        "ground_motion_notes": ("as recorded", "scaled by 2"),
+        "motion_name": "still",
+        "motion_notes": ("as recorded", "scaled by 2"),
         "steps_per_sample": 4,
         "error_estimate": 1e-7,
         "critical_delay": None,
@@ -423,11 +424,11 @@ def test_a_file_is_replaced_whole_or_left_as_it_was(tmp_path: Path, monkeypatch:
 
     monkeypatch.setattr(h5py.Group, "create_dataset", full)
     with pytest.raises(RecordingError, match=r"run\.h5: cannot be written: No space left on device"):
-        write_run(a_run(ground_motion_name="other"), path)
+        write_run(a_run(motion_name="other"), path)
     monkeypatch.undo()
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
-    write_run(a_run(ground_motion_name="other"), path)
+    write_run(a_run(motion_name="other"), path)
     with h5py.File(path, "r") as file:
         assert file.attrs["ground_motion_name"] == "other"
 
@@ -486,16 +487,20 @@ def test_a_synthetic_motion_needs_no_extra_and_a_run_of_it_is_the_same_each_time
 # The documentation ----------------------------------------------------------------------------------------------------
 
 
-def test_the_documentations_example_runs_and_its_python_runs_as_pasted(
+def test_the_documentations_examples_run_and_its_python_runs_as_pasted(
     capsys: pytest.CaptureFixture[str], root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text = (root / "docs" / "virtual-tests.md").read_text(encoding="utf-8")
-    blocks = dict(re.findall(r"^```(toml|python)\n(.*?)^```$", text, flags=re.M | re.S))
-    (tmp_path / "example.toml").write_text(blocks["toml"], encoding="utf-8")
-    assert run(capsys, "simulate", tmp_path / "example.toml")[0] == 0
+    blocks = re.findall(r"^```(toml|python)\n(.*?)^```$", text, flags=re.M | re.S)
+    assert [kind for kind, _ in blocks].count("toml") == 2
     (tmp_path / "examples").symlink_to(root / "examples", target_is_directory=True)
     monkeypatch.chdir(tmp_path)
-    exec(blocks["python"], {})
+    for kind, block in blocks:
+        if kind == "python":
+            exec(block, {})
+        else:
+            (tmp_path / "example.toml").write_text(block, encoding="utf-8")
+            assert run(capsys, "simulate", tmp_path / "example.toml")[0] == 0
     assert read_run_test(tmp_path / "run.h5") is not None
 
 
@@ -503,6 +508,7 @@ def test_the_documentation_names_every_key_that_a_configuration_may_have(root: P
     text = (root / "docs" / "virtual-tests.md").read_text(encoding="utf-8")
     kinds = (Law, Element, Actuator, Converter, DelayHistory, RayleighDamping)
     kinds += (FirstOrder, TransferFunction, ServoHydraulic, InverseCompensation, PolynomialExtrapolation)
+    kinds += (SineTarget, SweepTarget)
     classes = [one for kind in kinds for one in typing.get_args(kind) or (kind,)]
     names = {field.name for one in classes for field in dataclasses.fields(one)}
     names |= {field.name for field in dataclasses.fields(VirtualTest)} - {"structure", "actuators", "elements"}

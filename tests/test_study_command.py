@@ -269,7 +269,7 @@ def test_only_its_own_files_are_overwritten(capsys: pytest.CaptureFixture[str], 
 
 def test_a_run_brings_its_own_truth(tested: Run) -> None:
     found = study(tested, P=[1, 16], Q=[1], windows="hann", timing=False)
-    assert found.source_names == (tested.ground_motion_name,)
+    assert found.source_names == (tested.motion_name,)
     for cell in found.cells:
         assert cell.true_amplitude == pytest.approx(1.1, rel=physical(1e-9, "relative"))
         assert cell.true_delay_s == pytest.approx(0.001, rel=physical(1e-9, "relative"))

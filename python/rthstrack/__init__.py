@@ -26,9 +26,11 @@ from rthstrack.factors import (
 )
 from rthstrack.ground_motion import GroundMotion, list_records, read_ground_motion, record, synthetic_ground_motion
 from rthstrack.monitor import Monitor, MonitorSettings, Readings, causal_decimate
+from rthstrack.presets import PRESETS, preset
 from rthstrack.recording import Channel, Recording, propose_pair, read_recording
 from rthstrack.report import write_report
 from rthstrack.studies import Study, study
+from rthstrack.target_motion import RecordedTarget, SineTarget, SweepTarget, read_target
 from rthstrack.tracking import (
     BadSamples,
     Evaluator,
@@ -59,6 +61,7 @@ from rthstrack.virtual_test import (
 )
 
 __all__ = [
+    "PRESETS",
     "Assessment",
     "BadSamples",
     "Channel",
@@ -80,6 +83,7 @@ __all__ = [
     "MonitorSettings",
     "MovingTracking",
     "Readings",
+    "RecordedTarget",
     "Recording",
     "RecordingError",
     "RthstrackError",
@@ -87,7 +91,9 @@ __all__ = [
     "SettingError",
     "Settings",
     "SignalError",
+    "SineTarget",
     "Study",
+    "SweepTarget",
     "Tracking",
     "UnstableError",
     "VirtualTest",
@@ -106,10 +112,12 @@ __all__ = [
     "indices",
     "key_frequencies",
     "list_records",
+    "preset",
     "propose_pair",
     "read_configuration",
     "read_ground_motion",
     "read_recording",
+    "read_target",
     "record",
     "simulate",
     "simulate_many",

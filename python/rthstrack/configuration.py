@@ -1,4 +1,4 @@
-"""Configurations: a virtual test and its ground motion as a TOML file, and back as the table inside a run file."""
+"""Configurations: a virtual test and its ground motion or target as a TOML file, and back as a run file's table."""
 
 from __future__ import annotations
 
@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rthstrack.errors import ConfigurationError
-from rthstrack.ground_motion import check_ground_motion
+from rthstrack.ground_motion import check_ground_motion, ground_motion_from
 from rthstrack.keyed_table import NUMBER, NUMBERS, SQUARE, Table, read_toml
+from rthstrack.target_motion import check_target, target_from
 from rthstrack.virtual_test import (
+    OF_STRUCTURE,
     Actuator,
     BaberWen,
     BoucWen,
@@ -40,6 +42,9 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Callable, Mapping
 
+    from rthstrack.ground_motion import GroundMotion
+    from rthstrack.target_motion import TargetMotion
+
 __all__ = ["Configuration", "configuration_from", "read_configuration", "to_table", "virtual_test_from"]
 
 _LAWS: dict[str, type] = {
@@ -63,7 +68,7 @@ _TEST = ("stepping", "rate_hz", "tolerance", "bound_m", "seed")
 _CONVERTERS = ("command_converter", "displacement_sensor", "force_sensor")
 # A number of a degree of freedom beyond this one is a mistake of its own.
 _MOST_STAND_IN = 100
-_SECTIONS = ("", "test", "structure", "element", "actuator", "ground_motion")
+_SECTIONS = ("", "test", "structure", "element", "actuator", "ground_motion", "target")
 _FORMS = {
     "frequency_hz": ("frequency_hz", "mass_kg", "damping_ratio"),
     "storey_masses_kg with storey_stiffnesses_n_per_m": (
@@ -86,11 +91,18 @@ _FORMS = {
 
 
 class Configuration(NamedTuple):
-    """What a configuration says: the test, the table of its ground motion, the duration (None: the record's own)."""
+    """What a configuration says: the test, the table of its ground motion, the duration (None: the motion's own).
+
+    Where the actuators are alone (`test.structure.n_dof` 0), `motion` is the table of their target.
+    """
 
     test: VirtualTest
-    ground_motion: dict[str, Any]
+    motion: dict[str, Any]
     duration_s: float | None
+
+    def motion_from(self, base_dir: str | os.PathLike[str]) -> GroundMotion | TargetMotion:
+        """The ground motion or target, its file looked for in `base_dir`; raises what reading it raises."""
+        return (ground_motion_from if self.test.structure.n_dof else target_from)(self.motion, base_dir)
 
 
 def read_configuration(path: str | os.PathLike[str]) -> Configuration:
@@ -109,34 +121,47 @@ def configuration_from(
     """
     root = Table(table, "", [])
     parts = _parts(root)
-    ground_motion = root.table("ground_motion", required=True)
-    if ground_motion is not None:
-        root.mistakes += check_ground_motion(ground_motion.values, base_dir)
-    root.close()
+    motion = root.table("target" if parts.alone else "ground_motion", required=True)
+    if motion is not None and parts.alone:
+        rate_hz = parts.settings["rate_hz"]
+        root.mistakes += check_target(motion.values, base_dir, rate_hz if rate_hz > 0 else None)
+    elif motion is not None:
+        root.mistakes += check_ground_motion(motion.values, base_dir)
+    if "target" in root.values and not parts.alone:
+        beside = [f"[{name}]" for name in ("structure", "ground_motion") if name in root.values]
+        root.note("target", f"is for actuators alone: expected nothing beside it, found {' and '.join(beside)}")
+    root.close(("target", "ground_motion"))
     test = _checked(parts, root, file)
-    return Configuration(test, dict(ground_motion.values) if ground_motion else {}, parts.duration_s)
+    return Configuration(test, dict(motion.values) if motion else {}, parts.duration_s)
 
 
 def virtual_test_from(table: Mapping[str, Any], file: str | os.PathLike[str] = "") -> VirtualTest:
-    """The test alone, whatever the table says of the ground motion. Raises ConfigurationError as above."""
+    """The test alone, whatever the table says of the ground motion or target. Raises ConfigurationError as above."""
     root = Table(table, "", [])
     parts = _parts(root)
-    root.known.append("ground_motion")
-    root.close()
+    root.close(("target", "ground_motion"))
     return _checked(parts, root, file)
 
 
-def to_table(test: VirtualTest, ground_motion: Mapping[str, Any], duration_s: float | None) -> dict[str, Any]:
-    """The table that `configuration_from` reads as the same test, with every value written out; fit for JSON."""
+def to_table(test: VirtualTest, motion: Mapping[str, Any], duration_s: float | None) -> dict[str, Any]:
+    """The table that `configuration_from` reads as the same test, with every value written out; fit for JSON.
+
+    motion: the table of its ground motion, or of its target where the actuators are alone.
+    """
     table: dict[str, Any] = _plain(
         {
             "test": {name: getattr(test, name) for name in _TEST} | {"duration_s": duration_s},
             "structure": test.structure.description,
             "element": test.elements,
             "actuator": test.actuators,
-            "ground_motion": dict(ground_motion),
+            "ground_motion" if test.structure.n_dof else "target": dict(motion),
         }
     )
+    if not test.structure.n_dof:
+        del table["structure"], table["element"]
+        for actuator in table["actuator"]:
+            for name in OF_STRUCTURE:
+                del actuator[name]
     return table
 
 
@@ -159,8 +184,12 @@ def _plain(value: Any) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class _Parts:
-    """A test as far as it could be read; `n_dof` is known where the structure's size is, whatever else is wrong."""
+    """A test as far as it could be read; `n_dof` is known where the structure's size is, whatever else is wrong.
 
+    `alone`: there is to be no structure.
+    """
+
+    alone: bool
     structure: Structure | None
     n_dof: int | None
     elements: tuple[Element, ...]
@@ -179,11 +208,21 @@ def _parts(root: Table) -> _Parts:
         # It forbids least.
         settings["stepping"] = "cr"
     about.close()
-    table = root.table("structure", required=True)
-    structure, n_dof = (None, None) if table is None else _structure(table)
-    elements = tuple(_element(one) for one in root.tables("element"))
-    actuators = tuple(_actuator(one) for one in root.tables("actuator"))
-    return _Parts(structure, n_dof, elements, actuators, settings, duration_s)
+    # Beside a structure a target is a mistake, and the rest is checked as if it were not there.
+    alone = "target" in root.values and not {"structure", "ground_motion"} & set(root.values)
+    structure: Structure | None = Structure.none()
+    n_dof: int | None = 0
+    if alone:
+        if "element" in root.values:
+            root.known.append("element")
+            root.note("element", "is a part of the structure, and there is none beside [target]")
+        elements: tuple[Element, ...] = ()
+    else:
+        table = root.table("structure", required=True)
+        structure, n_dof = (None, None) if table is None else _structure(table)
+        elements = tuple(_element(one) for one in root.tables("element"))
+    actuators = tuple(_actuator(one, alone) for one in root.tables("actuator"))
+    return _Parts(alone, structure, n_dof, elements, actuators, settings, duration_s)
 
 
 def _structure(table: Table) -> tuple[Structure | None, int | None]:
@@ -258,11 +297,16 @@ def _element(table: Table) -> Element:
     return Element(table.one_of("law", _LAWS) or Spring(), **places)
 
 
-def _actuator(table: Table) -> Actuator:
-    nested = ("specimen", "delay_s", "dynamics", "compensation", *_CONVERTERS)
-    values = table.fields(Actuator, *(f.name for f in dataclasses.fields(Actuator) if f.name not in nested))
+def _actuator(table: Table, alone: bool) -> Actuator:
+    """`alone`: without a structure, of which it then says nothing; nor need it have a specimen."""
+    apart = ("specimen", "delay_s", "dynamics", "compensation", *_CONVERTERS, *(OF_STRUCTURE if alone else ()))
+    values = table.fields(Actuator, *(f.name for f in dataclasses.fields(Actuator) if f.name not in apart))
+    for name in OF_STRUCTURE if alone else ():
+        if name in table.values:
+            table.known.append(name)
+            table.note(name, "speaks of a structure, and there is none beside [target]: leave it out")
     several = isinstance(table.values.get("specimen"), list)
-    specimen = table.tables("specimen") if several else [table.table("specimen", required=True)]
+    specimen = table.tables("specimen") if several else [table.table("specimen", required=not alone)]
     laws = [one.one_of("law", _LAWS) or Spring() for one in specimen if one is not None]
     if isinstance(table.values.get("delay_s"), dict):
         history = table.table("delay_s")
@@ -284,7 +328,8 @@ def _actuator(table: Table) -> Actuator:
 
 def _checked(parts: _Parts, root: Table, file: str | os.PathLike[str]) -> VirtualTest:
     """The test, if neither reading nor `check` found a mistake; else ConfigurationError with all of them."""
-    test = VirtualTest(parts.structure or _stand_in(parts), parts.actuators, parts.elements, **parts.settings)
+    structure = _stand_in(parts) if parts.structure is None else parts.structure
+    test = VirtualTest(structure, parts.actuators, parts.elements, **parts.settings)
     noted = {key for key, _ in root.mistakes}
     found = [(one.key, one.message) for one in test.check() if one.key not in noted]
     if noted:

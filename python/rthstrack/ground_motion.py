@@ -21,17 +21,14 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from rthstrack.errors import ChannelError, RecordingError, RthstrackError, SettingError, SignalError
-from rthstrack.readers.at2 import ACCELERATION_UNITS, STANDARD_GRAVITY_M_S2, acceleration_unit, decoded, numbers
-from rthstrack.readers.stamps import Irregular, examine
-from rthstrack.recording import read_recording
+from rthstrack.errors import RecordingError, RthstrackError, SettingError, SignalError
+from rthstrack.motion_files import KEYS, Quantity, file_mistakes, read_motion
+from rthstrack.readers.at2 import ACCELERATION_UNITS, STANDARD_GRAVITY_M_S2, acceleration_unit
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
-
-    from rthstrack.recording import Channel, Recording
 
 __all__ = [
     "STANDARD_GRAVITY_M_S2",
@@ -52,7 +49,6 @@ SETS = ("farfield", "nearfield_pulse", "nearfield_no_pulse")
 _POINTS_PER_PERIOD = 64
 _LONGEST_PERIOD_S = 100.0
 _MOST_SAMPLES = 20_000_000
-_NUMBERS_BEGIN = re.compile(r"\s*(?:[-+.\d]|(?:nan|inf)\b)", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -212,75 +208,26 @@ def read_ground_motion(
     Raises RecordingError or ChannelError, one line, when the file or one of these is missing or cannot be used.
     """
     file = os.fspath(path)
-    if layout not in ("channels", "values"):
-        raise SettingError(f"{file}: layout: expected 'channels' or 'values', found '{layout}'")
-    if layout == "values":
-        if channel is not None:
-            raise SettingError(f"{file}: channel: a file with the layout 'values' has no channels")
-        values, notes = _in_reading_order(Path(path))
-        rate, own_unit, what = rate_hz, None, "values in reading order"
-        unknown = "a list of values states no sampling rate"
-    else:
-        recording = read_recording(path, rate_hz=rate_hz)
-        chosen = _acceleration_channel(recording) if channel is None else recording.channel(channel)
-        values, notes = chosen.values, recording.notes
-        rate, own_unit, what = recording.rate_hz, chosen.unit, f"channel '{chosen.path}'"
-        unknown = recording.rate_source
-    if rate is None:
-        raise RecordingError(f"{file}: sampling rate not known: {unknown}; give rate_hz")
-    given = unit or own_unit
-    if given is None:
-        raise RecordingError(f"{file}: {what}: the file does not say its unit; give unit, one of {_unit_names()}")
-    known = acceleration_unit(given)
-    if known is None:
-        raise RecordingError(f"{file}: {what}: expected a unit of acceleration ({_unit_names()}), found '{given}'")
-    if unit and own_unit and acceleration_unit(own_unit) != known:
-        notes = (*notes, f"{what}: the file's unit is {own_unit}, but {known[0]} was followed, as given")
+    read = read_motion(path, _ACCELERATION, channel=channel, unit=unit, rate_hz=rate_hz, layout=layout)
     try:
-        return GroundMotion(Path(path).stem, known[1] * values, float(rate), f"{file}, {what} in {known[0]}", notes)
+        return GroundMotion(Path(path).stem, read.values, read.rate_hz, read.source, read.notes)
     except SettingError as error:
         raise SettingError(f"{file}: {error}") from None
     except SignalError as error:
-        raise RecordingError(f"{file}: {what}: {error}") from None
+        raise RecordingError(f"{file}: {read.channel}: {error}") from None
 
 
-def _unit_names() -> str:
-    return ", ".join(ACCELERATION_UNITS)
-
-
-def _in_reading_order(path: Path) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-    """All numbers of a text file, line after line, and a note on the lines of words before them."""
-    try:
-        lines = decoded(path.read_bytes()).splitlines()
-        start = next((i for i, line in enumerate(lines) if _NUMBERS_BEGIN.match(line)), 0)
-        values = numbers(lines, start)
-    except OSError as error:
-        raise RecordingError(f"{path}: {error.strerror}") from None
-    except RecordingError as error:
-        raise RecordingError(f"{path}: {error}") from None
-    return values, (f"{start} line(s) of header left out",) if start else ()
-
-
-def _acceleration_channel(recording: Recording) -> Channel:
-    """The only channel that is no time or count; else the only one by its unit, by `ground` or by `acc` in its name."""
-    left = [c for c in recording.channels if isinstance(examine(c.values), Irregular)]
-    signs: tuple[Callable[[Channel], bool], ...] = (
+_ACCELERATION = Quantity(
+    "acceleration",
+    ", ".join(ACCELERATION_UNITS),
+    acceleration_unit,
+    # By its unit, by `ground` or by `acc` in its name.
+    (
         lambda c: acceleration_unit(c.unit or "") is not None,
         lambda c: re.search("ground|quake", c.name, re.IGNORECASE) is not None,
         lambda c: re.search("acc|a_?g$", c.name, re.IGNORECASE) is not None,
-    )
-    for sign in signs:
-        left = [c for c in left if sign(c)] or left
-    if len(left) == 1:
-        return left[0]
-    listed = ", ".join(f"#{recording.channels.index(c)} '{c.path}'" for c in left[:8])
-    listed += f" and {len(left) - 8} more" if len(left) > 8 else ""
-    said = (
-        f"{len(left)} channels may be the acceleration: {listed}" if left else "no channel that may be an acceleration"
-    )
-    nameless = left and all(c.name.startswith("column ") for c in left)
-    hint = "; if it is one record, several values a line, the layout is 'values'" if nameless else ""
-    raise ChannelError(f"{recording.file}: {said}; choose one with channel{hint}")
+    ),
+)
 
 
 # FEMA P695 ------------------------------------------------------------------------------------------------------------
@@ -494,7 +441,7 @@ Mistakes = list[tuple[str, str]]
 
 _SOURCES = ("record", "file", "synthetic")
 _SCALINGS = ("factor", "peak_m_s2", "arias_m_s", "spectral_acceleration")
-_OF_SOURCE = {"record": ("normalized",), "file": ("channel", "unit", "rate_hz", "layout"), "synthetic": ()}
+_OF_SOURCE = {"record": ("normalized",), "file": KEYS, "synthetic": ()}
 
 
 def check_ground_motion(table: object, base_dir: str | os.PathLike[str] | None = None) -> Mistakes:
@@ -520,7 +467,8 @@ def check_ground_motion(table: object, base_dir: str | os.PathLike[str] | None =
         if source in table:
             mistakes += [(f"ground_motion.{key}", message) for key, message in check(table[source])]
     if "file" in table:
-        mistakes += [(f"ground_motion.{key}", message) for key, message in _file_mistakes(table, base_dir)]
+        of_file = file_mistakes(table, base_dir, _ACCELERATION)
+        mistakes += [(f"ground_motion.{key}", message) for key, message in of_file]
     if not isinstance(table.get("normalized", False), bool):
         mistakes.append(("ground_motion.normalized", f"expected true or false, found {table['normalized']!r}"))
     return mistakes + [(f"ground_motion.{key}", message) for key, message in _scaling_mistakes(table)]
@@ -583,29 +531,6 @@ def _record_mistakes(value: object) -> Mistakes:
     except RthstrackError as error:
         return [("record", str(error))]
     return []
-
-
-def _file_mistakes(table: Mapping[str, Any], base_dir: str | os.PathLike[str] | None) -> Mistakes:
-    mistakes: Mistakes = []
-    for key in ("file", "channel", "unit"):
-        if key in table and not (isinstance(table[key], str) and table[key]):
-            mistakes.append((key, f"expected a text, found {table[key]!r}"))
-    if base_dir is not None and not mistakes and not (Path(base_dir) / table["file"]).is_file():
-        mistakes.append(("file", f"no such file: {Path(base_dir) / table['file']}"))
-    unit = table.get("unit")
-    if isinstance(unit, str) and unit and acceleration_unit(unit) is None:
-        mistakes.append(("unit", f"expected a unit of acceleration ({_unit_names()}), found '{unit}'"))
-    mistakes += _not_positive(table, ("rate_hz",))
-    layout = table.get("layout", "channels")
-    if layout not in ("channels", "values"):
-        mistakes.append(("layout", f"expected 'channels' or 'values', found {layout!r}"))
-    if layout == "values":
-        mistakes += [
-            (key, "expected one: the layout 'values' states none") for key in ("unit", "rate_hz") if key not in table
-        ]
-        if "channel" in table:
-            mistakes.append(("channel", "a file with the layout 'values' has no channels"))
-    return mistakes
 
 
 def _synthetic_table_mistakes(value: object) -> Mistakes:

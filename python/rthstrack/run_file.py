@@ -26,27 +26,30 @@ if TYPE_CHECKING:
 PROGRAM = "rthstrack"
 
 
-def write_run(run: Run, path: str | os.PathLike[str], *, ground_motion: Mapping[str, Any] | None = None) -> None:
+def write_run(run: Run, path: str | os.PathLike[str], *, motion: Mapping[str, Any] | None = None) -> None:
     """Writes a run as an HDF5 recording, whole or not at all.
 
     Channels: target, command, measured, force (target_1, target_2, ... for several actuators), displacement_1, ... of
-    the degrees of freedom, ground_motion; each with its unit. Attributes: rate_hz, configuration (JSON; with the table
-    `ground_motion` that the motion was made from, where it is given), program, version, what the run says of itself.
+    the degrees of freedom, ground_motion (neither without a structure); each with its unit. Attributes: rate_hz,
+    configuration (JSON; with the table `motion` that ground motion or target were made from, where it is given),
+    program, version, what the run says of itself.
     Raises SignalError for samples that are not finite, RecordingError if the file cannot be written.
     """
     channels = _channels(run)
     for name, (values, _) in channels.items():
         if not np.isfinite(values).all():
             raise SignalError(f"{os.fspath(path)}: not written: '{name}' has samples that are NaN or infinite")
-    described = {"name": run.ground_motion_name} if ground_motion is None else ground_motion
-    table = to_table(run.test, described, (len(run.ground_motion) - 1) / run.rate_hz)
+    table_of_motion = None if run.target_motion is None else run.target_motion.table
+    described = (motion if motion is not None else table_of_motion) or {"name": run.motion_name}
+    table = to_table(run.test, described, (run.n_samples - 1) / run.rate_hz)
+    what = "ground_motion" if run.ground_motion is not None else "target"
     attributes: dict[str, Any] = {
         "rate_hz": run.rate_hz,
         "program": PROGRAM,
         "version": __version__,
         "configuration": json.dumps(table, allow_nan=False),
-        "ground_motion_name": run.ground_motion_name,
-        "ground_motion_notes": "\n".join(run.ground_motion_notes),
+        f"{what}_name": run.motion_name,
+        f"{what}_notes": "\n".join(run.motion_notes),
         "steps_per_sample": run.steps_per_sample,
     }
     if math.isfinite(run.error_estimate):
@@ -106,4 +109,4 @@ def _channels(run: Run) -> dict[str, tuple[NDArray[np.float64], str]]:
         columns = {name: values} if values.ndim == 1 else {f"{name}_{i}": v for i, v in enumerate(values.T, start=1)}
         channels |= {key: (column, unit) for key, column in columns.items()}
     channels |= {f"displacement_{i}": (column, "m") for i, column in enumerate(run.displacement.T, start=1)}
-    return channels | {"ground_motion": (run.ground_motion, "m/s^2")}
+    return channels if run.ground_motion is None else channels | {"ground_motion": (run.ground_motion, "m/s^2")}

@@ -25,7 +25,6 @@ from rthstrack.assessment import json_ready
 from rthstrack.configuration import read_configuration
 from rthstrack.errors import RecordingError, SettingError, SignalError
 from rthstrack.factors import TOLERANCE, choose_factors, key_frequencies
-from rthstrack.ground_motion import ground_motion_from
 from rthstrack.recording import propose_pair, read_recording
 from rthstrack.run_file import read_run_test
 from rthstrack.tracking import Evaluator, Settings, Tracking, _count, _number, _Result, _single, evaluate
@@ -488,7 +487,7 @@ def _pairs(sources: Source | Sequence[Source] | Mapping[str, Source], truth: Tru
         if isinstance(source, Pair):
             pairs = [source if source.name else dataclasses.replace(source, name="test")]
         elif isinstance(source, Run):
-            pairs = _pairs_of_run(source, source.ground_motion_name)
+            pairs = _pairs_of_run(source, source.motion_name)
         elif isinstance(source, str | Path):
             pairs = read_pairs(source)
         else:
@@ -522,7 +521,7 @@ def _pairs_of_run(run: Run, name: str) -> list[Pair]:
             run.rate_hz,
             _named(name, i, n),
             _truth_of(run.test, i),
-            notes=run.ground_motion_notes,
+            notes=run.motion_notes,
         )
         for i in range(n)
     ]
@@ -548,8 +547,9 @@ def _truth_in_file(file: str, target: str, measured: str) -> Truth | None:
 
 def _simulated(file: str) -> Run:
     configuration = read_configuration(file)
-    motion = ground_motion_from(configuration.ground_motion, Path(file).parent)
-    return simulate(configuration.test, motion, duration_s=configuration.duration_s)
+    return simulate(
+        configuration.test, configuration.motion_from(Path(file).parent), duration_s=configuration.duration_s
+    )
 
 
 # ---------------------------------------------------------------------------------------------------------- the numbers

@@ -3,6 +3,7 @@
     M x'' + C x' + K x + sum of restoring forces = -M i a_g        (relative to the ground; SI units)
 
 `VirtualTest` says what is tested, `simulate` runs it under a ground motion, `critical_delay` says which delay it bears.
+Without a structure (`Structure.none()`) the actuators alone follow a target that is given.
 Degrees of freedom are numbered from 1; 0 is the ground. delay > 0: measured lags.
 """
 
@@ -11,7 +12,7 @@ from __future__ import annotations
 import math
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from rthstrack.ground_motion import GroundMotion
+    from rthstrack.target_motion import TargetMotion
 
     Floats = NDArray[np.float64]
 
@@ -128,7 +130,8 @@ class Structure:
     """The whole structure, elastic: mass, damping, stiffness (n, n), `influence` (n,) of the ground motion.
 
     What a specimen or a restoring element with `part_of_structure` brings is subtracted from it by the virtual test.
-    Made by `sdof`, `shear_building` or `from_matrices`; `description` is the configuration's table that makes it anew.
+    Made by `sdof`, `shear_building`, `from_matrices` or, for actuators alone, `none`; `description` is the
+    configuration's table that makes it anew.
     """
 
     mass_kg: NDArray[np.float64]
@@ -137,6 +140,17 @@ class Structure:
     influence: NDArray[np.float64]
     natural_frequencies_hz: NDArray[np.float64]
     description: dict[str, object] = field(repr=False)
+
+    @classmethod
+    def none(cls) -> Structure:
+        """No structure, of no degrees of freedom: what a test of actuators alone has."""
+        empty = np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(0)
+        return cls._built((empty, []), np.zeros(0), {})
+
+    @property
+    def n_dof(self) -> int:
+        """Degrees of freedom; 0 is no structure."""
+        return len(self.mass_kg)
 
     @classmethod
     def sdof(cls, frequency_hz: float, damping_ratio: float, mass_kg: float = 1000.0) -> Structure:
@@ -279,9 +293,10 @@ class Actuator:
 
     Measured follows gain * command(t - delay), passed on through `dynamics` where there are any. `specimen` are laws
     side by side. `part_of_structure`: what they bring (mass, elastic stiffness, damping) is taken out of the structure.
+    Without a structure there may be no specimen, and nothing may be said of what speaks of the structure.
     """
 
-    specimen: tuple[Law, ...]
+    specimen: tuple[Law, ...] = ()
     dof: int = 1
     from_dof: int = 0
     specimen_mass_kg: float = 0.0
@@ -298,7 +313,10 @@ class Actuator:
 
 @dataclass(frozen=True, slots=True)
 class VirtualTest:
-    """Everything that is tested but the ground motion. `stepping`: `continuous` or `cr`."""
+    """Everything that is tested but the ground motion or target. `stepping`: `continuous` or `cr`.
+
+    `structure` is `Structure.none()` where the actuators alone are tested; all of them then follow the same target.
+    """
 
     structure: Structure
     actuators: tuple[Actuator, ...]
@@ -312,12 +330,12 @@ class VirtualTest:
     def check(self) -> tuple[Mistake, ...]:
         """Everything that is wrong with it, each with its key: `actuator[1].delay_s`, numbered from 1."""
         # The core counts without a sign and knows two names: it is asked about the rest.
-        mistakes = list(self._miscounted())
+        mistakes = [*self._miscounted(), *self._unstructured()]
         told = {m.key.rpartition(".")[0] for m in mistakes if m.key.endswith("dof")}
         if self.stepping not in ("continuous", "cr"):
             mistakes.append(Mistake("test.stepping", f"expected 'continuous' or 'cr', found {self.stepping!r}"))
         for key, message in _core.check_test(self._counted() if mistakes else self):
-            if not (key.endswith("dof") and key.rpartition(".")[0] in told):
+            if not (key.endswith("dof") and key.rpartition(".")[0] in told) and key not in {m.key for m in mistakes}:
                 mistakes.append(Mistake(key, message))
         for i, actuator in enumerate(self.actuators, 1):
             for name in _CONVERTERS:
@@ -349,6 +367,27 @@ class VirtualTest:
         elements = tuple(replace(element, **placed(element)) for element in self.elements)
         return replace(self, elements=elements, actuators=tuple(actuators), stepping=stepping)
 
+    def _unstructured(self) -> Iterator[Mistake]:
+        """Without a structure: what speaks of one."""
+        if self.structure.n_dof:
+            return
+        for i, actuator in enumerate(self.actuators, 1):
+            for name in OF_STRUCTURE:
+                found, usual = getattr(actuator, name), _DEFAULTS[name]
+                # What is below 0 has been told.
+                if found != usual and (isinstance(found, bool) or found >= 0):
+                    yield Mistake(
+                        f"actuator[{i}].{name}",
+                        f"speaks of a structure, and there is none: leave it out, found {found}",
+                    )
+            for j, law in enumerate(actuator.specimen, 1):
+                if getattr(law, "stiffness_n_per_m", 0.0) is None:
+                    place = "specimen" if len(actuator.specimen) == 1 else f"specimen[{j}]"
+                    yield Mistake(
+                        f"actuator[{i}].{place}.stiffness_n_per_m",
+                        "missing: expected a number, for there is no structure whose stiffness could be meant",
+                    )
+
     def _miscounted(self) -> Iterator[Mistake]:
         for what, items in (("element", self.elements), ("actuator", self.actuators)):
             for i, item in enumerate(items, 1):
@@ -359,6 +398,11 @@ class VirtualTest:
                 order = getattr(getattr(item, "compensation", None), "order", 1)
                 if order < 0:
                     yield Mistake(f"{what}[{i}].compensation.order", f"expected 1, 2 or 3, found {order}")
+
+
+#: What an actuator says of its place in the structure.
+OF_STRUCTURE = ("dof", "from_dof", "part_of_structure", "force_delay_samples")
+_DEFAULTS = {one.name: one.default for one in fields(Actuator)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -393,8 +437,10 @@ class DelayDamping:
 class Run:
     """A finished virtual test. Signals are (n_samples,) for one actuator, else (n_samples, n_actuators); SI units.
 
-    displacement (n_samples, n_dof) relative to the ground, ground_motion (n_samples,) in m/s2. `error_estimate` is the
-    largest change of target and measured, over their peaks, when the internal step is halved (NaN for cr).
+    displacement (n_samples, n_dof) relative to the ground, ground_motion (n_samples,) in m/s2, None for actuators
+    alone. `motion_name` and `motion_notes` are of ground motion or target, `target_motion` is the target as given.
+    `error_estimate` is the largest change of target and measured (and of the force, without a structure), over their
+    peaks, when the internal step is halved (NaN for cr).
     """
 
     test: VirtualTest
@@ -404,12 +450,18 @@ class Run:
     measured: NDArray[np.float64]
     force: NDArray[np.float64]
     displacement: NDArray[np.float64]
-    ground_motion: NDArray[np.float64]
-    ground_motion_name: str
-    ground_motion_notes: tuple[str, ...]
+    ground_motion: NDArray[np.float64] | None
+    motion_name: str
+    motion_notes: tuple[str, ...]
     steps_per_sample: int
     error_estimate: float
     critical_delay: CriticalDelay | None
+    target_motion: TargetMotion | None = None
+
+    @property
+    def n_samples(self) -> int:
+        """Samples of each signal."""
+        return len(self.target)
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes the HDF5 recording that `read_recording` and `rthstrack evaluate` read."""
@@ -419,20 +471,37 @@ class Run:
 
 
 def simulate(
-    test: VirtualTest, ground_motion: GroundMotion, *, duration_s: float | None = None, seed: int | None = None
+    test: VirtualTest,
+    motion: GroundMotion | TargetMotion,
+    *,
+    duration_s: float | None = None,
+    seed: int | None = None,
 ) -> Run:
-    """Runs a virtual test under a ground motion, from rest.
+    """Runs a virtual test, from rest: a structure under a ground motion, or actuators alone along a target.
 
-    The ground motion is resampled to `test.rate_hz` (linear, zero past its last sample); the run has
-    round(duration_s rate) + 1 samples, by default as long as the record. `seed` is `test.seed` unless given.
+    A ground motion is resampled to `test.rate_hz` (linear, zero past its last sample), a target is computed there; the
+    run has round(duration_s rate) + 1 samples, by default as long as the motion. `seed` is `test.seed` unless given.
     Raises ConfigurationError with every mistake, UnstableError with the time at which a displacement left its bound.
     """
+    from rthstrack.ground_motion import GroundMotion
+
     test = test if seed is None else replace(test, seed=seed)
     plan = _plan(test)
-    ground = ground_motion.resampled(test.rate_hz, duration_s)
-    acceleration = np.ascontiguousarray(ground.acceleration_m_s2)
-    signals, left = plan.run(acceleration, _noise(test, len(acceleration)))
-    critical = CriticalDelay(*plan.critical_delay()) if len(test.actuators) == 1 else None
+    acceleration: Floats | None = None
+    target_motion, critical = None, None
+    if isinstance(motion, GroundMotion):
+        if not test.structure.n_dof:
+            raise ConfigurationError("", [("structure", "missing: a ground motion needs one; give a target instead")])
+        ground = motion.resampled(test.rate_hz, duration_s)
+        acceleration, notes = np.ascontiguousarray(ground.acceleration_m_s2), ground.notes
+        signals, left = plan.run(acceleration, _noise(test, len(acceleration)))
+        critical = CriticalDelay(*plan.critical_delay()) if len(test.actuators) == 1 else None
+    else:
+        if test.structure.n_dof:
+            raise ConfigurationError("", [("structure", "expected none where a target is given: actuators alone")])
+        target_motion = motion
+        samples, notes = motion.sampled(test.rate_hz, duration_s)
+        signals, left = plan.follow(samples, _noise(test, len(samples)))
     if signals is None:
         time_s, bound_m = left or (math.nan, math.nan)
         raise UnstableError(
@@ -450,24 +519,28 @@ def simulate(
         measured,
         force,
         displacement,
-        ground.acceleration_m_s2,
-        ground.name,
-        ground.notes,
+        acceleration,
+        motion.name,
+        notes,
         steps,
         error,
         critical,
+        target_motion,
     )
 
 
 def simulate_many(
-    cases: Iterable[tuple[VirtualTest, GroundMotion]], judge: Callable[[Run], Result], *, n_workers: int | None = None
+    cases: Iterable[tuple[VirtualTest, GroundMotion | TargetMotion]],
+    judge: Callable[[Run], Result],
+    *,
+    n_workers: int | None = None,
 ) -> Iterator[Result | UnstableError]:
     """Runs many tests on all cores; yields what `judge` makes of each run, in order, and keeps no run itself.
 
     An unstable test yields its UnstableError. `n_workers` is the number of processors unless given.
     """
 
-    def one(case: tuple[VirtualTest, GroundMotion]) -> Result | UnstableError:
+    def one(case: tuple[VirtualTest, GroundMotion | TargetMotion]) -> Result | UnstableError:
         try:
             return judge(simulate(*case))
         except UnstableError as error:

@@ -5,8 +5,8 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use rthstrack::Error;
 use rthstrack::dynamics::{
-    Actuator, BoucWen, Compensation, Converter, Damping, Delay, Dynamics, Element, Law, Mistake, ServoHydraulic,
-    Stepping, Structure, TestConfig,
+    Actuator, BoucWen, Compensation, Converter, Damping, Delay, Dynamics, Element, Law, Mistake, Motion, Run,
+    ServoHydraulic, Stepping, Structure, TestConfig,
 };
 
 use crate::error::{choice, to_py};
@@ -238,8 +238,12 @@ fn configuration(py: Python<'_>, test: &Bound<'_, PyAny>) -> PyResult<TestConfig
     let influence = influence.as_slice().map_err(contiguous)?;
     let damping = Damping::Matrix(matrix("damping_n_s_per_m")?);
     let (mass, stiffness) = (matrix("mass_kg")?, matrix("stiffness_n_per_m")?);
-    let structure = Structure::from_matrices(influence.len(), &mass, &stiffness, &damping, Some(influence))
-        .map_err(|mistakes| to_py(py, &Error::Configuration(mistakes)))?;
+    let structure = if influence.is_empty() {
+        Structure::none()
+    } else {
+        Structure::from_matrices(influence.len(), &mass, &stiffness, &damping, Some(influence))
+            .map_err(|mistakes| to_py(py, &Error::Configuration(mistakes)))?
+    };
     Ok(TestConfig {
         elements: test.getattr("elements")?.try_iter()?.map(|e| element(&e?, &structure)).collect::<PyResult<_>>()?,
         actuators: test
@@ -266,8 +270,7 @@ fn check_test(py: Python<'_>, test: &Bound<'_, PyAny>) -> PyResult<Mistakes> {
 }
 
 /// One matrix (n_samples, n_signals) of a signal a row.
-fn columns<'py>(py: Python<'py>, signals: &[Vec<f64>]) -> Bound<'py, PyArray2<f64>> {
-    let n_samples = signals.first().map_or(0, Vec::len);
+fn columns<'py>(py: Python<'py>, signals: &[Vec<f64>], n_samples: usize) -> Bound<'py, PyArray2<f64>> {
     let mut flat = Vec::with_capacity(n_samples * signals.len());
     for sample in 0..n_samples {
         flat.extend(signals.iter().map(|s| s[sample]));
@@ -295,6 +298,25 @@ type Signals<'py> = (
 /// The signals, or when and at which bound the test became unstable.
 type Outcome<'py> = (Option<Signals<'py>>, Option<(f64, f64)>);
 
+fn outcome<'py>(py: Python<'py>, run: rthstrack::Result<Run>) -> PyResult<Outcome<'py>> {
+    let run = match run {
+        Ok(run) => run,
+        Err(Error::Unstable { time_s, bound_m }) => return Ok((None, Some((time_s, bound_m)))),
+        Err(error) => return Err(to_py(py, &error)),
+    };
+    let n_samples = run.target.first().map_or(0, Vec::len);
+    let signals = (
+        columns(py, &run.target, n_samples),
+        columns(py, &run.command, n_samples),
+        columns(py, &run.measured, n_samples),
+        columns(py, &run.force, n_samples),
+        columns(py, &run.displacement, n_samples),
+        run.steps_per_sample,
+        run.error_estimate,
+    );
+    Ok((Some(signals), None))
+}
+
 #[pymethods]
 impl VirtualTest {
     #[new]
@@ -312,21 +334,22 @@ impl VirtualTest {
         noise: Vec<Option<Vec<f64>>>,
     ) -> PyResult<Outcome<'py>> {
         let ground = ground.as_slice()?;
-        let run = match py.detach(|| self.plan.run(ground, &noise)) {
-            Ok(run) => run,
-            Err(Error::Unstable { time_s, bound_m }) => return Ok((None, Some((time_s, bound_m)))),
-            Err(error) => return Err(to_py(py, &error)),
-        };
-        let signals = (
-            columns(py, &run.target),
-            columns(py, &run.command),
-            columns(py, &run.measured),
-            columns(py, &run.force),
-            columns(py, &run.displacement),
-            run.steps_per_sample,
-            run.error_estimate,
-        );
-        Ok((Some(signals), None))
+        outcome(py, py.detach(|| self.plan.run(ground, &noise)))
+    }
+
+    /// The same of actuators alone, which follow a target (n_samples, 3): displacement, velocity, acceleration.
+    fn follow<'py>(
+        &self,
+        py: Python<'py>,
+        target: PyReadonlyArray2<'py, f64>,
+        noise: Vec<Option<Vec<f64>>>,
+    ) -> PyResult<Outcome<'py>> {
+        let target: Vec<Motion> = target
+            .as_slice()?
+            .chunks_exact(3)
+            .map(|m| Motion { displacement: m[0], velocity: m[1], acceleration: m[2] })
+            .collect();
+        outcome(py, py.detach(|| self.plan.follow(&target, &noise)))
     }
 
     fn critical_delay(&self, py: Python<'_>) -> PyResult<Critical> {

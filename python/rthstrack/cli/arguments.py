@@ -7,10 +7,12 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rthstrack.presets import PRESETS
 from rthstrack.tracking import Settings
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
+    from typing import Any
 
 ESTIMATORS = ("fei", "aligned", "least_squares")
 
@@ -39,7 +41,10 @@ def add_method(parser: argparse.ArgumentParser, *, trusted: bool = False) -> arg
     """What every evaluation settles, whatever its P and Q; `trusted`: the trusted estimate is made beside it."""
     of_trusted = ", and so does the trusted estimate" if trusted else ""
     method = parser.add_argument_group("evaluation")
-    method.add_argument("--estimator", choices=ESTIMATORS, default="fei", metavar="E",
+    method.add_argument("--preset", choices=tuple(PRESETS), metavar="NAME",
+                        help="paper: estimator fei, Q = 16, Tukey window, mean removed, as Guo, Xu and Chen (2014) "
+                        "recommend; paper-fast: P = 16 too; what is given beside it goes before it")  # fmt: skip
+    method.add_argument("--estimator", choices=ESTIMATORS, default=NOT_GIVEN, metavar="E",
                         help="fei (default, as published), aligned or least_squares")  # fmt: skip
     method.add_argument("--max-delay", type=positive, default=Settings().max_delay_s, metavar="S",
                         help="largest delay or lead looked for by all estimators but fei (%(default)s s)")  # fmt: skip
@@ -55,10 +60,25 @@ def add_method(parser: argparse.ArgumentParser, *, trusted: bool = False) -> arg
                         f"estimators but fei{of_trusted}, or keep")  # fmt: skip
     method.add_argument("--decimator", choices=("spectral", "chebyshev"), default="spectral", metavar="D",
                         help="how P is done: spectral (default) or chebyshev, as published")  # fmt: skip
-    method.add_argument("--detrend", choices=("none", "mean", "linear"), default="none", metavar="D",
+    method.add_argument("--detrend", choices=("none", "mean", "linear"), default=NOT_GIVEN, metavar="D",
                         help="none (default), mean or linear")  # fmt: skip
     method.add_argument("--band", nargs=2, type=not_negative, metavar=("LO", "HI"), help="frequencies judged, in Hz")
     return method
+
+
+#: The default of what a preset may fix: absent, and so told from what was given.
+NOT_GIVEN = argparse.SUPPRESS
+
+
+def settle(
+    args: argparse.Namespace, usual: Mapping[str, Any], of_preset: Callable[[Settings], Mapping[str, Any]]
+) -> None:
+    """Gives what was not given the preset's value or, without one, the usual value."""
+    settings = PRESETS[args.preset] if args.preset is not None else Settings()
+    values = {"estimator": settings.estimator, "detrend": settings.detrend, **usual}
+    for name, value in (values if args.preset is None else {**values, **of_preset(settings)}).items():
+        if not hasattr(args, name):
+            setattr(args, name, value)
 
 
 def expected_delay_mistake(expected_delay_s: float | None, max_delay_s: float) -> str | None:

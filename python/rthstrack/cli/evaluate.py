@@ -16,12 +16,14 @@ from typing import TYPE_CHECKING, Any
 from rthstrack import display
 from rthstrack.assessment import Assessment, Limits, assess, json_ready, result_entry, without_trusted
 from rthstrack.cli.arguments import (
+    NOT_GIVEN,
     add_method,
     add_signals,
     expected_delay_mistake,
     factor,
     path,
     positive,
+    settle,
     tolerance,
     weight_power,
 )
@@ -59,14 +61,17 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     signals = add_signals(parser, "signals (a channel is named by name, path or #index)")
     signals.add_argument("--command", action="append", metavar="C", help="what compensation sends: judged apart")
     method = add_method(parser, trusted=True)
-    method.add_argument("-P", type=factor, default=1, metavar="N", help="data decimation, a power of two, or auto")
-    method.add_argument("-Q", type=factor, default=1, metavar="N", help="frequency decimation, a power of two, or auto")
+    method.add_argument("-P", type=factor, default=NOT_GIVEN, metavar="N",
+                        help="data decimation, a power of two, or auto (1)")  # fmt: skip
+    method.add_argument("-Q", type=factor, default=NOT_GIVEN, metavar="N",
+                        help="frequency decimation, a power of two, or auto (1)")  # fmt: skip
     method.add_argument("--tolerance", type=tolerance, metavar="X",
                         help="auto takes the largest P and Q that change amplitude and delay by at most this share, of "
                         f"the whole record ({TOLERANCE}); moving windows then keep P = Q = 1")  # fmt: skip
     method.add_argument("--weight-power", type=weight_power, default=2, metavar="L", help="bins weigh |target|^L (2)")
     windows = ("boxcar", "hann", "hamming", "blackman", "flattop", "tukey")
-    method.add_argument("--window", choices=windows, default="boxcar", metavar="W", help=f"one of {', '.join(windows)}")
+    method.add_argument("--window", choices=windows, default=NOT_GIVEN, metavar="W",
+                        help=f"one of {', '.join(windows)} (boxcar)")  # fmt: skip
     method.add_argument("--moving", type=positive, metavar="S", help="length of a moving window (4 s)")
     method.add_argument("--hop", type=positive, metavar="S", help="from one moving window to the next")
     limits = parser.add_argument_group("limits")
@@ -85,6 +90,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
     """Evaluates the files; returns the exit status."""
+    settle(args, {"P": 1, "Q": 1, "window": "boxcar"}, _of_preset)
     _check(args, misuse)
     results, failures = _evaluate_all(args)
     assessments = [a for found in results for a in found]
@@ -192,6 +198,10 @@ def _assess(
         said.insert(0, f"no channels were named: judged target '{asked.name}', measured '{answered.name}' ({proposal})")
     said += recording.notes if part == "whole" else ()
     return dataclasses.replace(assessment, warnings=tuple(said))
+
+
+def _of_preset(settings: Settings) -> dict[str, Any]:
+    return {"P": settings.data_decimation, "Q": settings.frequency_decimation, "window": settings.window}
 
 
 def _settings(args: argparse.Namespace) -> Settings:

@@ -14,7 +14,6 @@ import numpy as np
 from rthstrack.cli.arguments import path, positive
 from rthstrack.configuration import read_configuration
 from rthstrack.errors import ConfigurationError, SettingError
-from rthstrack.ground_motion import ground_motion_from
 from rthstrack.virtual_test import delay_damping, simulate, true_tracking
 
 if TYPE_CHECKING:
@@ -34,8 +33,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "simulate",
         help="run a virtual test: part of a structure computed, part a specimen behind an actuator that lags",
         description="Runs the virtual test that a TOML file describes (structure, restoring forces, actuators with "
-        "their delay and compensation, ground motion; see docs/virtual-tests.md and examples/*.toml), says which delay "
-        "its loop bears and what a delay costs in damping, and writes a recording that 'rthstrack evaluate' judges. "
+        "their delay and compensation, ground motion; or actuators alone along a sine, a sweep or a recorded target; "
+        "see docs/virtual-tests.md and examples/*.toml), says which delay its loop bears and what a delay costs in "
+        "damping, and writes a recording that 'rthstrack evaluate' judges. "
         "Exit status: 0 done, 1 the test is unstable or a file failed, 2 misuse or a mistake in the configuration.",
     )
     parser.add_argument("config", metavar="CONFIG.toml", help="the test; every mistake in it is reported at once")
@@ -44,8 +44,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--output",
         type=path(".h5", ".hdf5"),
         metavar="RUN.h5",
-        help="write target, command, measured, force, displacements and ground motion, with the configuration inside; "
-        "a file of this name is replaced",
+        help="write target, command, measured, force and, of a structure, displacements and ground motion, with the "
+        "configuration inside; a file of this name is replaced",
     )
     parser.add_argument("--duration", type=positive, metavar="S", help="seconds, instead of the configuration's")
     parser.add_argument("--seed", type=_seed, metavar="N", help="of the sensors' noise, instead of the configuration's")
@@ -56,21 +56,22 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
     """Runs the test; returns the exit status."""
     if args.output is not None and not args.output.parent.is_dir():
         misuse(f"--output: there is no directory {args.output.parent}")
-    test, table, duration_s = read_configuration(args.config)
+    configuration = read_configuration(args.config)
+    test, table, duration_s = configuration
     if args.seed is not None:
         test = dataclasses.replace(test, seed=args.seed)
-    motion = ground_motion_from(table, Path(args.config).parent)
+    motion = configuration.motion_from(Path(args.config).parent)
     try:
         finished = simulate(test, motion, duration_s=args.duration or duration_s)
     except SettingError as error:
-        # What only test and ground motion together show, such as a delay longer than the record.
+        # What only test and motion together show, such as a delay longer than the record.
         mistakes = error.mistakes if isinstance(error, ConfigurationError) else [("", str(error))]
         raise ConfigurationError(args.config, mistakes) from None
     _print(finished, args.config)
     if args.output is not None:
         from rthstrack.run_file import write_run
 
-        write_run(finished, args.output, ground_motion=table)
+        write_run(finished, args.output, motion=table)
         print(f"run written to {args.output}; judge it with: rthstrack evaluate {args.output}", file=sys.stderr)
     return 0
 
@@ -94,24 +95,33 @@ def _print(run: Run, config: str) -> None:
 
 def _of_test(run: Run, config: str) -> Iterable[tuple[str, str]]:
     """What was run, as labels and values."""
-    n, frequencies = len(run.ground_motion), run.test.structure.natural_frequencies_hz
+    n, frequencies = run.n_samples, run.test.structure.natural_frequencies_hz
     yield "test", f"{config}: {n} samples at {run.rate_hz:g} Hz ({(n - 1) / run.rate_hz:g} s)"
-    yield "ground motion", f"{run.ground_motion_name}, peak {np.abs(run.ground_motion).max():.4g} m/s2"
-    yield from (("", note) for note in run.ground_motion_notes)
+    if run.ground_motion is None:
+        yield "target", getattr(run.target_motion, "source", run.motion_name)
+        yield from (("", note) for note in run.motion_notes)
+        return
+    yield "ground motion", f"{run.motion_name}, peak {np.abs(run.ground_motion).max():.4g} m/s2"
+    yield from (("", note) for note in run.motion_notes)
     yield "structure", f"{len(frequencies)} degree{'s' * (len(frequencies) > 1)} of freedom, {_list(frequencies)} Hz"
 
 
 def _of_delay(run: Run) -> Iterable[tuple[str, str]]:
     """What the actuators leave, what the loop bears, and what that costs."""
-    left = _left(run)
-    for number, tracking in enumerate(left, start=1):
-        which = f"actuator {number}" if len(left) > 1 else "actuator"
-        if tracking is None:
-            yield which, "gain and delay vary: no one value"
-        else:
-            amplitude, delay_s, frequency_hz = tracking
-            way = f"{_ms(abs(delay_s))} {'lag' if delay_s >= 0 else 'lead'}"
-            yield which, f"gain {amplitude:.4g}, {way} at {frequency_hz:.4g} Hz, compensation included"
+    left = [_left(run, frequency_hz) for frequency_hz in _frequencies(run)]
+    for number in range(len(run.test.actuators)):
+        which = f"actuator {number + 1}" if len(run.test.actuators) > 1 else "actuator"
+        # What varies has no value at any frequency.
+        for tracking in dict.fromkeys(found[number] for found in left):
+            if tracking is None:
+                yield which, "gain and delay vary: no one value"
+            else:
+                amplitude, delay_s, frequency_hz = tracking
+                way = f"{_ms(abs(delay_s))} {'lag' if delay_s >= 0 else 'lead'}"
+                yield which, f"gain {amplitude:.4g}, {way} at {frequency_hz:.4g} Hz, compensation included"
+            which = ""
+    if run.ground_motion is None:
+        return
     critical = run.critical_delay
     if critical is None:
         yield "critical delay", "not computed: known for one actuator only"
@@ -121,7 +131,8 @@ def _of_delay(run: Run) -> Iterable[tuple[str, str]]:
         said = "" if critical.exact else ", of the elastic stiffness, before anything yields"
         at = f" at {critical.frequency_hz:.4g} Hz" if math.isfinite(critical.frequency_hz) else ""
         yield "critical delay", f"{_ms(critical.delay_s)}{at}, with gain {critical.gain:g}{said}"
-    delay_s = left[0][1] if critical is not None and left[0] is not None else 0.0
+    first = left[0][0]
+    delay_s = first[1] if critical is not None and first is not None else 0.0
     if delay_s > 0:
         cost = delay_damping(run.test, delay_s)
         gain = f", with gain {critical.gain:g}" if critical is not None and critical.gain != 1 else ""
@@ -138,11 +149,17 @@ def _of_run(run: Run) -> Iterable[tuple[str, str]]:
         which = f"peaks, actuator {i + 1}" if len(run.test.actuators) > 1 else "peaks"
         target, measured, force = (float(peaks[name][i]) for name in names)
         yield which, f"target {1e3 * target:.4g} mm, measured {1e3 * measured:.4g} mm, force {force / 1e3:.4g} kN"
+    if run.target_motion is not None:
+        motion, _ = run.target_motion.sampled(run.rate_hz, (run.n_samples - 1) / run.rate_hz)
+        speed = float(np.abs(motion[:, 1]).max())
+        yield "", f"the target moves by up to {1e3 * speed:.4g} mm/s"
     if run.test.stepping == "cr":
-        yield "stepping", "cr, one step a sample"
+        integrator = "cr, one step a sample" if run.ground_motion is not None else "once a sample, as a controller does"
+        yield "stepping", integrator
     else:
         steps = f"{run.steps_per_sample} step{'s' * (run.steps_per_sample > 1)} a sample"
-        change = f"halving the step last changed target and measured by {run.error_estimate:.2g} of their peaks"
+        what = "target and measured" if run.ground_motion is not None else "measured and force"
+        change = f"halving the step last changed {what} by {run.error_estimate:.2g} of their peaks"
         yield "stepping", f"continuous, {steps}; {change}"
 
 
@@ -162,20 +179,29 @@ def _warnings(run: Run) -> Iterable[str]:
             share = float(np.mean(np.abs(values) >= getattr(actuator, name).limit * (1 - 1e-9)))
             if share:
                 yield f"the {what} of actuator {i + 1} was at its limit in {100 * share:.2g} % of the samples"
-    critical, left = run.critical_delay, _left(run)[0]
-    if critical is not None and left is not None and left[1] >= critical.delay_s:
+    critical = run.critical_delay
+    if critical is None:
+        return
+    left = _left(run, _frequencies(run)[0])[0]
+    if left is not None and left[1] >= critical.delay_s:
         yield (
             f"the lag of {_ms(left[1])} exceeds the critical delay of {_ms(critical.delay_s)}: the elastic loop is "
             "unstable; what kept this test within its bounds is its length or what yields"
         )
 
 
-def _left(run: Run) -> Sequence[tuple[float, float, float] | None]:
-    """Gain, delay and the frequency they hold at, for each actuator: where the loop would ring, else the first mode."""
+def _frequencies(run: Run) -> Sequence[float]:
+    """Where gain and delay are told: where the loop would ring, else the first mode; of a target its own."""
+    if run.target_motion is not None:
+        return run.target_motion.frequencies_hz
     critical = run.critical_delay
-    frequency_hz = float(run.test.structure.natural_frequencies_hz[0])
     if critical is not None and math.isfinite(critical.frequency_hz):
-        frequency_hz = critical.frequency_hz
+        return (critical.frequency_hz,)
+    return (float(run.test.structure.natural_frequencies_hz[0]),)
+
+
+def _left(run: Run, frequency_hz: float) -> Sequence[tuple[float, float, float] | None]:
+    """Gain, delay and the frequency they hold at, for each actuator."""
     found = (true_tracking(run.test, frequency_hz, actuator) for actuator in range(len(run.test.actuators)))
     return [None if one is None else (one[0].item(), one[1].item(), frequency_hz) for one in found]
 

@@ -15,12 +15,14 @@ from typing import TYPE_CHECKING, Any
 
 from rthstrack.assessment import json_ready
 from rthstrack.cli.arguments import (
+    NOT_GIVEN,
     add_method,
     add_signals,
     count,
     expected_delay_mistake,
     number,
     positive,
+    settle,
     tolerance,
 )
 from rthstrack.errors import RthstrackError, SettingError
@@ -45,6 +47,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from rthstrack.studies import Cell
+    from rthstrack.tracking import Settings
 
 FAILED = 1
 _DESCRIPTION = """\
@@ -90,17 +93,25 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     grid.add_argument(
         "-P",
         metavar="LIST",
+        default=NOT_GIVEN,
         help=f"data decimations, powers of two (default: {powers})"
         "; auto among them adds the one that --tolerance allows",
     )
     grid.add_argument(
-        "-Q", metavar="LIST", help=f"frequency decimations, powers of two (default: {powers}); auto likewise"
+        "-Q",
+        metavar="LIST",
+        default=NOT_GIVEN,
+        help=f"frequency decimations, powers of two (default: {powers}); auto likewise",
     )
     grid.add_argument("--combined", nargs=2, type=count, metavar=("P", "Q"),
                       help="largest P and Q taken together; each alone goes as far as its list (default: "
                       f"{COMBINED[0]} {COMBINED[1]}, or every P with every Q where -P or -Q is given)")  # fmt: skip
-    grid.add_argument("--windows", default=",".join(WINDOWS), metavar="LIST",
-                      help="of boxcar, hann, hamming, blackman, flattop, tukey (default: %(default)s)")  # fmt: skip
+    grid.add_argument(
+        "--windows",
+        default=NOT_GIVEN,
+        metavar="LIST",
+        help=f"of boxcar, hann, hamming, blackman, flattop, tukey (default: {','.join(WINDOWS)})",
+    )
     grid.add_argument("--weight-powers", metavar="LIST",
                       help=f"bins weigh |target|^L, 1 to 16 (default: {','.join(map(str, WEIGHT_POWERS))}; "
                       "2 for least_squares, which knows no other)")  # fmt: skip
@@ -127,6 +138,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
     """Studies the sources; returns the exit status."""
+    settle(args, {"P": None, "Q": None, "windows": ",".join(WINDOWS)}, _of_preset)
     if len(args.target or []) != len(args.measured or []):
         misuse(f"--target and --measured go in pairs, found {len(args.target or [])} and {len(args.measured or [])}")
     if args.resample and args.rate:
@@ -181,6 +193,12 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
     for note in written:
         print(note, file=sys.stderr)
     return FAILED if failures else 0
+
+
+def _of_preset(settings: Settings) -> dict[str, str]:
+    """Its factors, beside none."""
+    p, q = ("1" if one == 1 else f"1,{one}" for one in (settings.data_decimation, settings.frequency_decimation))
+    return {"P": p, "Q": q, "windows": settings.window}
 
 
 def _items(text: str) -> tuple[str, ...]:

@@ -224,8 +224,12 @@ impl Actuator {
         across(self.dof, self.from_dof, x)
     }
 
-    pub(crate) fn check(&self, checks: &mut Checks, sampled: bool, rate_hz: f64) {
+    /// That there is something to be tested, which an actuator alone need not have.
+    pub(crate) fn check_specimen(&self, checks: &mut Checks) {
         checks.demand("specimen", !self.specimen.is_empty(), "at least one restoring force", "none");
+    }
+
+    pub(crate) fn check(&self, checks: &mut Checks, sampled: bool, rate_hz: f64) {
         for (i, law) in self.specimen.iter().enumerate() {
             checks.under(&self.specimen_key(i), |c| law.check(c));
         }
@@ -535,7 +539,10 @@ impl SampledActuator {
     pub fn new(actuator: &Actuator, rate_hz: f64) -> crate::Result<Self> {
         crate::pair::check_rate(rate_hz)?;
         let mut checks = Checks::default();
-        checks.under("actuator[1]", |c| actuator.check(c, true, rate_hz));
+        checks.under("actuator[1]", |c| {
+            actuator.check_specimen(c);
+            actuator.check(c, true, rate_hz);
+        });
         if checks.mistakes.is_empty() {
             Ok(Self::planned(actuator, rate_hz))
         } else {

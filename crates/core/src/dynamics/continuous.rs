@@ -7,14 +7,16 @@
 //! falls with the fourth power of the step for linear systems, and with about the third where a law has corners (Bouc-Wen
 //! at reversals). A specimen's mass behind a delay makes the equation neutral: corners of the ground motion return within
 //! later steps, and the order falls to between one and two.
+//!
+//! Where the target is given there is no equation to solve but the actuators': what they follow is looked up in it.
 
 use nalgebra::DMatrix;
 
 use super::actuator::{Delay, Dynamics, StateSpace, across, servo_rate};
-use super::history::{History, Motion, Tap};
+use super::history::{Course, History, Motion, Tap};
 use super::law::Law;
 use super::structure::rows;
-use super::virtual_test::{Noise, Run, VirtualTest, across_add, add_across, configuration};
+use super::virtual_test::{Drive, Noise, Run, VirtualTest, across_add, add_across, configuration};
 use crate::error::{Error, Result};
 
 /// omega h at which halving begins.
@@ -27,15 +29,15 @@ const MAX_HALVINGS: usize = 6;
 const MAX_STEPS: f64 = 1024.0;
 const ENOUGH: usize = 1 << 27;
 
-pub(crate) fn run(test: &VirtualTest, ground: &[f64], noise: &Noise, bound: f64) -> Result<Run> {
+pub(crate) fn run(test: &VirtualTest, drive: Drive<'_>, noise: &Noise, bound: f64) -> Result<Run> {
     let mut steps = first_steps(test)?;
     // The first is only compared with, and keeps no more than that needs.
-    let mut coarse = attempt(test, ground, bound, steps, false);
+    let mut coarse = attempt(test, drive, bound, steps, test.is_alone());
     for _ in 0..MAX_HALVINGS {
         steps *= 2;
-        let mut fine = attempt(test, ground, bound, steps, true);
+        let mut fine = attempt(test, drive, bound, steps, true);
         if let (Ok(one), Ok(two)) = (&coarse, &mut fine) {
-            two.error_estimate = difference(one, two);
+            two.error_estimate = difference(one, two, test.is_alone());
         }
         // Both unstable: the loop is, not the steps.
         let settled = match (&coarse, &fine) {
@@ -44,7 +46,7 @@ pub(crate) fn run(test: &VirtualTest, ground: &[f64], noise: &Noise, bound: f64)
             _ => false,
         };
         coarse = fine;
-        if settled || steps * ground.len() > ENOUGH {
+        if settled || steps * drive.len() > ENOUGH {
             break;
         }
     }
@@ -69,7 +71,8 @@ fn first_steps(test: &VirtualTest) -> Result<usize> {
         rate = rate.max(actuator.fastest_pole().unwrap_or(0.0));
     }
     let mut steps = (rate * dt / PACE).ceil().max(1.0);
-    for actuator in &test.config.actuators {
+    // A given target is looked up wherever the delay lies.
+    for actuator in test.config.actuators.iter().filter(|_| !test.is_alone()) {
         let shortest = actuator.delay.range().0;
         if shortest * SHORTEST >= dt {
             steps = steps.max((dt / shortest).ceil());
@@ -86,10 +89,11 @@ fn first_steps(test: &VirtualTest) -> Result<usize> {
     Ok(steps as usize)
 }
 
-/// The largest change of target and measured over their peaks.
-fn difference(one: &Run, two: &Run) -> f64 {
+/// The largest change of target and measured over their peaks; of the force too where nothing that it moves would show it.
+fn difference(one: &Run, two: &Run, alone: bool) -> f64 {
     let mut worst: f64 = 0.0;
-    for (a, b) in one.target.iter().zip(&two.target).chain(one.measured.iter().zip(&two.measured)) {
+    let moved = one.target.iter().zip(&two.target).chain(one.measured.iter().zip(&two.measured));
+    for (a, b) in moved.chain(one.force.iter().zip(&two.force).filter(|_| alone)) {
         let peak = crate::pair::peak(b);
         let change = a.iter().zip(b).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()));
         if peak > 0.0 {
@@ -142,6 +146,8 @@ struct Rig {
 struct Equations<'a> {
     test: &'a VirtualTest,
     n: usize,
+    /// The target, where it is given and there is no structure (n = 0), and what it is at the stage.
+    course: Option<(Course<'a>, Motion)>,
     /// Inverse of the mass with the specimens that follow without delay.
     inverse: Vec<f64>,
     damping: Option<Vec<f64>>,
@@ -156,8 +162,12 @@ struct Equations<'a> {
 }
 
 impl<'a> Equations<'a> {
-    fn new(test: &'a VirtualTest, step_s: f64) -> Result<Self> {
+    fn new(test: &'a VirtualTest, drive: Drive<'a>, step_s: f64) -> Result<Self> {
         let n = test.config.structure.n_dof();
+        let course = match drive {
+            Drive::Target(samples) => Some((Course::new(samples, test.config.rate_hz), Motion::default())),
+            Drive::Ground(_) => None,
+        };
         let mut mass = test.numerical.mass.clone();
         let mut len = 2 * n;
         let mut rigs = Vec::new();
@@ -169,8 +179,11 @@ impl<'a> Equations<'a> {
             let servo = matches!(actuator.dynamics, Dynamics::ServoHydraulic(_));
             let through = if servo { 0.0 } else { system.as_ref().map_or(1.0, |s| s.d) };
             let instant = actuator.delay == Delay::Constant(0.0);
-            let inertia = if instant { actuator.gain * through * actuator.specimen_mass } else { 0.0 };
-            add_across(&mut mass, actuator.dof, actuator.from_dof, inertia);
+            let mut inertia = 0.0;
+            if instant && n > 0 {
+                inertia = actuator.gain * through * actuator.specimen_mass;
+                add_across(&mut mass, actuator.dof, actuator.from_dof, inertia);
+            }
             let dynamics = len;
             len += if servo { 5 + 2 * actuator.specimen.len() } else { system.as_ref().map_or(0, StateSpace::order) };
             let memory = len;
@@ -178,7 +191,7 @@ impl<'a> Equations<'a> {
                 len += 2 * actuator.specimen.len();
             }
             let taps = match actuator.delay {
-                Delay::Constant(delay) if delay >= step_s => {
+                Delay::Constant(delay) if delay >= step_s && n > 0 => {
                     Some([0.5, 1.0].map(|reach| Tap::new((delay / step_s - reach).max(0.0), step_s)))
                 }
                 _ => None,
@@ -209,17 +222,44 @@ impl<'a> Equations<'a> {
         }
         places.extend((0..test.config.elements.len()).map(|i| elements + 2 * i));
         limits.extend(test.config.elements.iter().map(|e| e.law.limit()));
-        let some = |matrix: &DMatrix<f64>| (matrix.amax() > 0.0).then(|| rows(matrix));
-        let inverse = mass.try_inverse().filter(|m| m.iter().all(|v| v.is_finite()));
+        let some = |matrix: &DMatrix<f64>| (n > 0 && matrix.amax() > 0.0).then(|| rows(matrix));
+        let inverse = if n > 0 { mass.try_inverse().filter(|m| m.iter().all(|v| v.is_finite())) } else { Some(mass) };
         let inverse =
             rows(&inverse.ok_or_else(|| configuration("structure.mass_kg", "expected a matrix that can be inverted"))?);
         let (damping, stiffness) = (some(&test.numerical.damping), some(&test.numerical.stiffness));
-        Ok(Self { test, n, inverse, damping, stiffness, rigs, elements, force: vec![0.0; n], len, places, limits })
+        Ok(Self {
+            test,
+            n,
+            course,
+            inverse,
+            damping,
+            stiffness,
+            rigs,
+            elements,
+            force: vec![0.0; n],
+            len,
+            places,
+            limits,
+        })
     }
 
     /// Finds each actuator's delayed target for the stage at `reach` (0, 1/2, 1) of the step that begins at `time`.
     #[inline(always)]
-    fn look(&mut self, time: f64, reach: f64, h: f64) {
+    fn look<const ONE: bool>(&mut self, time: f64, reach: f64, h: f64) {
+        if let (false, Some((course, now))) = (ONE, &mut self.course) {
+            // What was found at the end of a step stands at the start of the next.
+            if reach == 0.0 && time > 0.0 {
+                return;
+            }
+            let (time, rate) = (time + reach * h, self.test.config.rate_hz);
+            *now = course.at(time * rate);
+            for (rig, actuator) in self.rigs.iter_mut().zip(&self.test.config.actuators) {
+                let (delay, slope) = actuator.delay.at(time);
+                rig.pace = 1.0 - slope;
+                rig.lookup = Lookup::Past(if rig.instant { *now } else { course.at((time - delay) * rate) });
+            }
+            return;
+        }
         for (rig, actuator) in self.rigs.iter_mut().zip(&self.test.config.actuators) {
             if let Some([middle, end]) = &rig.taps {
                 if reach > 0.0 {
@@ -246,7 +286,10 @@ impl<'a> Equations<'a> {
     fn record(&self, run: &mut Run, sample: usize, x: &[f64], acceleration: &[f64], bound: f64) -> bool {
         let mut within = x.iter().all(|x| x.abs() <= bound);
         for (i, (rig, actuator)) in self.rigs.iter().zip(&self.test.config.actuators).enumerate() {
-            let answered = rig.seen.force + rig.inertia * actuator.across(acceleration);
+            let mut answered = rig.seen.force;
+            if !acceleration.is_empty() {
+                answered += rig.inertia * actuator.across(acceleration);
+            }
             run.target[i][sample] = rig.seen.target;
             run.measured[i][sample] = rig.seen.measured;
             within &= rig.seen.measured.abs() <= bound && answered.is_finite();
@@ -295,7 +338,10 @@ impl<'a> Equations<'a> {
         }
         for (rig, actuator) in self.rigs.iter_mut().zip(&self.test.config.actuators) {
             let (dof, from_dof) = (actuator.dof, actuator.from_dof);
-            let (target, velocity) = (across(dof, from_dof, x), across(dof, from_dof, v));
+            let (target, velocity) = match &self.course {
+                Some((_, now)) if !ONE => (now.displacement, now.velocity),
+                _ => (across(dof, from_dof, x), across(dof, from_dof, v)),
+            };
             let mut input = match rig.lookup {
                 Lookup::Past(motion) => motion,
                 Lookup::Now => Motion { displacement: target, velocity, acceleration: 0.0 },
@@ -325,11 +371,13 @@ impl<'a> Equations<'a> {
                 (motion.displacement, answered)
             };
             rig.seen = Seen { target, measured: motion, force: answered };
-            push(force, dof, from_dof, answered);
+            if ONE || n > 0 {
+                push(force, dof, from_dof, answered);
+            }
         }
         if ONE {
             (out[0], out[1]) = (v[0], self.inverse[0] * force[0]);
-        } else {
+        } else if n > 0 {
             out[..n].copy_from_slice(v);
             super::sampled::multiply(&self.inverse, force, &mut out[n..2 * n]);
         }
@@ -381,12 +429,12 @@ fn place<const ONE: bool>(actuator: &super::Actuator, x: &[f64]) -> f64 {
 }
 
 /// The whole record with a fixed number of steps a sample, of the ideal sensors.
-fn attempt(test: &VirtualTest, ground: &[f64], bound: f64, steps: usize, whole: bool) -> Result<Run> {
-    let equations = Equations::new(test, 1.0 / test.config.rate_hz / steps as f64)?;
+fn attempt(test: &VirtualTest, drive: Drive<'_>, bound: f64, steps: usize, whole: bool) -> Result<Run> {
+    let equations = Equations::new(test, drive, 1.0 / test.config.rate_hz / steps as f64)?;
     let n_blocks = equations.len.div_ceil(4);
     match (equations.n, n_blocks) {
-        (1, 1) => stepped::<true, _>([[0.0; 4]; 1], equations, ground, bound, steps, whole),
-        _ => stepped::<false, _>(vec![[0.0; 4]; n_blocks], equations, ground, bound, steps, whole),
+        (1, 1) => stepped::<true, _>([[0.0; 4]; 1], equations, drive, bound, steps, whole),
+        _ => stepped::<false, _>(vec![[0.0; 4]; n_blocks], equations, drive, bound, steps, whole),
     }
 }
 
@@ -404,7 +452,7 @@ fn combine(out: &mut [[f64; 4]], y: &[[f64; 4]], k: &[[f64; 4]], f: impl Fn(f64,
 fn stepped<const ONE: bool, S: Clone + AsRef<[[f64; 4]]> + AsMut<[[f64; 4]]>>(
     rest: S,
     mut equations: Equations<'_>,
-    ground: &[f64],
+    drive: Drive<'_>,
     bound: f64,
     steps: usize,
     whole: bool,
@@ -412,40 +460,45 @@ fn stepped<const ONE: bool, S: Clone + AsRef<[[f64; 4]]> + AsMut<[[f64; 4]]>>(
     let test = equations.test;
     let dt = 1.0 / test.config.rate_hz;
     let (h, n) = (dt / steps as f64, if ONE { 1 } else { equations.n });
+    let (ground, n_samples): (&[f64], usize) = match drive {
+        Drive::Ground(ground) => (ground, ground.len()),
+        Drive::Target(target) => (&[], target.len()),
+    };
+    let moves = ONE || n > 0;
     let (mut y, mut ahead, mut total, mut k) = (rest.clone(), rest.clone(), rest.clone(), rest);
-    let mut run = Run::sized(equations.rigs.len(), n, if whole { ground.len() } else { 0 }, steps);
+    let mut run = Run::sized(equations.rigs.len(), n, if whole { n_samples } else { 0 }, steps);
     for signal in run.target.iter_mut().chain(&mut run.measured) {
-        signal.resize(ground.len(), 0.0);
+        signal.resize(n_samples, 0.0);
     }
-    for sample in 0..ground.len() {
-        let from = ground[sample];
+    for sample in 0..n_samples {
+        let from = ground.get(sample).copied().unwrap_or(0.0);
         let slope = ground.get(sample + 1).map_or(0.0, |to| (to - from) / steps as f64);
         for step in 0..steps {
             let time = (sample * steps + step) as f64 * h;
             let at = from + slope * step as f64;
             let now = y.as_ref().as_flattened();
-            for (rig, actuator) in equations.rigs.iter_mut().zip(&test.config.actuators) {
+            for (rig, actuator) in equations.rigs.iter_mut().zip(&test.config.actuators).filter(|_| moves) {
                 let (displacement, velocity) =
                     (place::<ONE>(actuator, &now[..n]), place::<ONE>(actuator, &now[n..2 * n]));
                 rig.history.open(displacement, velocity);
             }
-            equations.look(time, 0.0, h);
+            equations.look::<ONE>(time, 0.0, h);
             equations.rate::<ONE>(at, now, k.as_mut().as_flattened_mut());
-            for (rig, actuator) in equations.rigs.iter_mut().zip(&test.config.actuators) {
+            for (rig, actuator) in equations.rigs.iter_mut().zip(&test.config.actuators).filter(|_| moves) {
                 rig.history.accelerate(place::<ONE>(actuator, &k.as_ref().as_flattened()[n..2 * n]));
             }
             if step == 0 {
                 if !equations.record(&mut run, sample, &now[..n], &k.as_ref().as_flattened()[n..2 * n], bound) {
                     return Err(Error::Unstable { time_s: sample as f64 * dt, bound_m: bound });
                 }
-                if sample + 1 == ground.len() {
+                if sample + 1 == n_samples {
                     run.command.clone_from(&run.target);
                     return Ok(run);
                 }
             }
             combine(total.as_mut(), y.as_ref(), k.as_ref(), |y, k| y + h / 6.0 * k);
             combine(ahead.as_mut(), y.as_ref(), k.as_ref(), |y, k| y + 0.5 * h * k);
-            equations.look(time, 0.5, h);
+            equations.look::<ONE>(time, 0.5, h);
             for reach in [0.5 * h, h] {
                 equations.rate::<ONE>(at + 0.5 * slope, ahead.as_ref().as_flattened(), k.as_mut().as_flattened_mut());
                 for (total, k) in total.as_mut().iter_mut().zip(k.as_ref()) {
@@ -455,7 +508,7 @@ fn stepped<const ONE: bool, S: Clone + AsRef<[[f64; 4]]> + AsMut<[[f64; 4]]>>(
                 }
                 combine(ahead.as_mut(), y.as_ref(), k.as_ref(), |y, k| y + reach * k);
             }
-            equations.look(time, 1.0, h);
+            equations.look::<ONE>(time, 1.0, h);
             equations.rate::<ONE>(at + slope, ahead.as_ref().as_flattened(), k.as_mut().as_flattened_mut());
             combine(y.as_mut(), total.as_ref(), k.as_ref(), |total, k| total + h / 6.0 * k);
             equations.hold::<ONE>(y.as_mut().as_flattened_mut());
@@ -466,7 +519,7 @@ fn stepped<const ONE: bool, S: Clone + AsRef<[[f64; 4]]> + AsMut<[[f64; 4]]>>(
 
 #[cfg(test)]
 mod tests {
-    use super::attempt;
+    use super::{Drive, attempt};
     use crate::dynamics::{
         Actuator, BoucWen, Compensation, Converter, Delay, Dynamics, Law, Stepping, Structure, TestConfig, VirtualTest,
     };
@@ -505,7 +558,7 @@ mod tests {
     fn errors(test: &VirtualTest) -> Vec<f64> {
         let push = |t: f64| 3.0 * (5.0 * t).sin() * t * (-t).exp();
         let ground: Vec<f64> = (0..640).map(|i| push(f64::from(i) / 64.0)).collect();
-        let run = |steps| attempt(test, &ground, 1e3, steps, true).unwrap().target.remove(0);
+        let run = |steps| attempt(test, Drive::Ground(&ground), 1e3, steps, true).unwrap().target.remove(0);
         let fine = run(256);
         let largest = |x: &[f64], y: &[f64]| x.iter().zip(y).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()));
         let peak = largest(&fine, &vec![0.0; fine.len()]);

@@ -47,6 +47,54 @@ pub(crate) fn hermite(s: f64, h: f64, p0: f64, d0: f64, p1: f64, d1: f64) -> (f6
     (p0 + s * (h * d0 + s * (c2 + s * c3)), d0 + s * (2.0 * c2 + 3.0 * s * c3) / h)
 }
 
+/// The polynomial of fifth degree through two motions h apart, at the fraction s: with its own velocity and acceleration.
+#[inline]
+pub(crate) fn quintic(s: f64, h: f64, from: Motion, to: Motion) -> Motion {
+    let (v, a) = (h * from.velocity, 0.5 * h * h * from.acceleration);
+    // What is missing at the end of displacement, velocity and acceleration.
+    let d = to.displacement - from.displacement - v - a;
+    let e = h * to.velocity - v - 2.0 * a;
+    let f = h * h * to.acceleration - 2.0 * a;
+    let (c3, c4, c5) = (10.0 * d - 4.0 * e + 0.5 * f, -15.0 * d + 7.0 * e - f, 6.0 * d - 3.0 * e + 0.5 * f);
+    Motion {
+        displacement: from.displacement + s * (v + s * (a + s * (c3 + s * (c4 + s * c5)))),
+        velocity: (v + s * (2.0 * a + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)))) / h,
+        acceleration: (2.0 * a + s * (6.0 * c3 + s * (12.0 * c4 + s * 20.0 * c5))) / (h * h),
+    }
+}
+
+/// How far rounding may take the time of a sample from it, in samples.
+const ROUNDING: f64 = 1e-9;
+
+/// A target that is given, sample by sample; at rest before its first.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Course<'a> {
+    samples: &'a [Motion],
+    step_s: f64,
+}
+
+impl<'a> Course<'a> {
+    pub(crate) fn new(samples: &'a [Motion], rate_hz: f64) -> Self {
+        Self { samples, step_s: 1.0 / rate_hz }
+    }
+
+    /// The motion at a place counted in samples: between two of them the polynomial through both.
+    #[inline]
+    pub(crate) fn at(&self, place: f64) -> Motion {
+        if place < -ROUNDING {
+            return Motion::default();
+        }
+        // A sample is itself, however its time was rounded.
+        let whole = (place + ROUNDING) as usize;
+        let s = place - whole as f64;
+        match (self.samples.get(whole), self.samples.get(whole + 1)) {
+            (Some(from), _) if s < ROUNDING => *from,
+            (Some(from), Some(to)) => quintic(s, self.step_s, *from, *to),
+            _ => Motion::default(),
+        }
+    }
+}
+
 /// A constant distance behind the newest motion: the steps and the Hermite weights of the motions on either side.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Tap {
@@ -182,5 +230,46 @@ impl History {
         let (displacement, velocity) =
             hermite(1.0 - s, self.step_s, old.displacement, old.velocity, new.displacement, new.velocity);
         Motion { displacement, velocity, acceleration: new.acceleration + s * (old.acceleration - new.acceleration) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Course, Motion, quintic};
+
+    /// 1 + 2 t - t^2 + 3 t^3 - 2 t^4 + t^5 with its derivatives.
+    fn polynomial(t: f64) -> Motion {
+        Motion {
+            displacement: 1.0 + t * (2.0 + t * (-1.0 + t * (3.0 + t * (-2.0 + t)))),
+            velocity: 2.0 + t * (-2.0 + t * (9.0 + t * (-8.0 + t * 5.0))),
+            acceleration: -2.0 + t * (18.0 + t * (-24.0 + t * 20.0)),
+        }
+    }
+
+    fn assert_close(found: Motion, expected: Motion) {
+        for (a, b) in [
+            (found.displacement, expected.displacement),
+            (found.velocity, expected.velocity),
+            (found.acceleration, expected.acceleration),
+        ] {
+            assert!((a - b).abs() < 1e-12, "{found:?}, {expected:?}");
+        }
+    }
+
+    #[test]
+    fn a_polynomial_of_fifth_degree_is_found_again_between_its_ends() {
+        for s in [0.0, 0.1, 0.5, 0.93, 1.0] {
+            assert_close(quintic(s, 0.5, polynomial(1.0), polynomial(1.5)), polynomial(1.0 + 0.5 * s));
+        }
+    }
+
+    #[test]
+    fn a_given_target_is_itself_at_its_samples_and_rests_before_them() {
+        let samples: Vec<Motion> = (0..5).map(|i| polynomial(f64::from(i) * 0.25)).collect();
+        let course = Course::new(&samples, 4.0);
+        assert_eq!(course.at(3.0 - 1e-12), samples[3]);
+        assert_eq!(course.at(4.0), samples[4]);
+        assert_eq!(course.at(-0.5), Motion::default());
+        assert_close(course.at(2.6), polynomial(0.65));
     }
 }

@@ -1,5 +1,5 @@
 //! Virtual tests: a structure of which part is computed and part is a specimen, moved by actuators that lag:
-//! M x'' + C x' + K x + sum of restoring forces = -M i a_g.
+//! M x'' + C x' + K x + sum of restoring forces = -M i a_g. Or actuators alone, along a target that is given.
 //!
 //! Data flows through the modules in this order:
 //!

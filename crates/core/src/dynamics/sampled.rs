@@ -1,8 +1,9 @@
-//! The loop of a laboratory's computer: integrate, compensate, move, measure, once a sample.
+//! The loop of a laboratory's computer: integrate, compensate, move, measure, once a sample; or, without a structure to
+//! integrate, the same with a target that is given.
 
 use nalgebra::DMatrix;
 
-use super::actuator::{SampledActuator, SampledActuatorState};
+use super::actuator::{Actuator, SampledActuator, SampledActuatorState};
 use super::compensator::CompensatorState;
 use super::history::Motion;
 use super::law::Memory;
@@ -64,6 +65,75 @@ struct Rig {
     late: Vec<f64>,
 }
 
+impl Rig {
+    fn new(actuator: &Actuator, rate_hz: f64) -> Self {
+        let plan = SampledActuator::planned(actuator, rate_hz);
+        Self {
+            state: plan.state(),
+            plan,
+            compensator: actuator.compensation.state(rate_hz),
+            velocity: 0.0,
+            measured: 0.0,
+            felt: 0.0,
+            moved: 0.0,
+            late: vec![0.0; actuator.force_delay_samples],
+        }
+    }
+
+    /// One sample: target in, moved and measured, with the noise of command, displacement and force; what was sent out.
+    #[inline(always)]
+    fn step(&mut self, actuator: &Actuator, target: Motion, noise: [f64; 3], rate_hz: f64) -> f64 {
+        let mut command = actuator.compensation.step(&mut self.compensator, target, rate_hz, self.measured);
+        let sent = actuator.command_converter.convert(command.displacement + noise[0]);
+        if sent.abs() >= actuator.command_converter.limit {
+            command.velocity = 0.0;
+        }
+        command.displacement = sent;
+        let (motion, answer) = self.plan.step(&mut self.state, command);
+        self.measured = actuator.displacement_sensor.convert(motion.displacement + noise[1]);
+        self.felt = actuator.force_sensor.convert(answer + noise[2]);
+        self.moved = motion.displacement;
+        sent
+    }
+
+    /// Writes a sample of actuator `i`.
+    #[inline(always)]
+    fn record(&self, run: &mut Run, i: usize, sample: usize, target: f64, sent: f64) {
+        run.target[i][sample] = target;
+        run.command[i][sample] = sent;
+        run.measured[i][sample] = self.measured;
+        run.force[i][sample] = self.felt;
+    }
+
+    #[inline(always)]
+    fn is_within(&self, bound: f64) -> bool {
+        self.moved.abs() <= bound && self.measured.is_finite() && self.felt.is_finite()
+    }
+}
+
+/// The noise of one actuator's command, displacement and force.
+#[inline(always)]
+fn noise_of(noise: &Noise, actuator: usize, sample: usize) -> [f64; 3] {
+    [0, 1, 2].map(|i| noise.get(3 * actuator + i).and_then(Option::as_ref).map_or(0.0, |n| n[sample]))
+}
+
+/// The same loop where the target is given.
+pub(crate) fn follow(test: &VirtualTest, target: &[Motion], noise: &Noise, bound: f64) -> Result<Run> {
+    let (actuators, rate) = (&test.config.actuators, test.config.rate_hz);
+    let mut rigs: Vec<Rig> = actuators.iter().map(|actuator| Rig::new(actuator, rate)).collect();
+    let mut run = Run::sized(rigs.len(), 0, target.len(), 1);
+    for (sample, target) in target.iter().enumerate() {
+        for (i, (rig, actuator)) in rigs.iter_mut().zip(actuators).enumerate() {
+            let sent = rig.step(actuator, *target, noise_of(noise, i, sample), rate);
+            rig.record(&mut run, i, sample, target.displacement, sent);
+        }
+        if !rigs.iter().all(|rig| rig.is_within(bound)) {
+            return Err(Error::Unstable { time_s: sample as f64 / rate, bound_m: bound });
+        }
+    }
+    Ok(run)
+}
+
 pub(crate) fn run(test: &VirtualTest, ground: &[f64], noise: &Noise, bound: f64) -> Result<Run> {
     let config = &test.config;
     let (n, rate) = (config.structure.n_dof(), config.rate_hz);
@@ -74,30 +144,13 @@ pub(crate) fn run(test: &VirtualTest, ground: &[f64], noise: &Noise, bound: f64)
     let (damping, stiffness) = (rows(&test.numerical.damping), rows(&test.numerical.stiffness));
     let viscous = test.numerical.damping != DMatrix::zeros(n, n);
     let elastic = test.numerical.stiffness != DMatrix::zeros(n, n);
-    let mut rigs: Vec<Rig> = config
-        .actuators
-        .iter()
-        .map(|actuator| {
-            let plan = SampledActuator::planned(actuator, rate);
-            Rig {
-                state: plan.state(),
-                plan,
-                compensator: actuator.compensation.state(rate),
-                velocity: 0.0,
-                measured: 0.0,
-                felt: 0.0,
-                moved: 0.0,
-                late: vec![0.0; actuator.force_delay_samples],
-            }
-        })
-        .collect();
+    let mut rigs: Vec<Rig> = config.actuators.iter().map(|actuator| Rig::new(actuator, rate)).collect();
     let mut memories: Vec<Memory> = vec![[0.0; 2]; config.elements.len()];
     let mut places = vec![0.0; config.elements.len()];
     let limits: Vec<f64> = config.elements.iter().map(|e| e.law.limit()).collect();
     let (mut x, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
     let (mut force, mut scratch) = (vec![0.0; n], vec![0.0; n]);
     let mut run = Run::sized(rigs.len(), n, ground.len(), 1);
-    let noisy = |channel: usize, sample: usize| noise.get(channel).and_then(Option::as_ref).map_or(0.0, |n| n[sample]);
 
     for sample in 0..ground.len() {
         if sample > 0 {
@@ -127,24 +180,12 @@ pub(crate) fn run(test: &VirtualTest, ground: &[f64], noise: &Noise, bound: f64)
             let target =
                 Motion { displacement: actuator.across(&x), velocity, acceleration: (velocity - rig.velocity) * rate };
             rig.velocity = velocity;
-            let mut command = actuator.compensation.step(&mut rig.compensator, target, rate, rig.measured);
-            let sent = actuator.command_converter.convert(command.displacement + noisy(3 * i, sample));
-            if sent.abs() >= actuator.command_converter.limit {
-                command.velocity = 0.0;
-            }
-            command.displacement = sent;
-            let (motion, answer) = rig.plan.step(&mut rig.state, command);
-            rig.measured = actuator.displacement_sensor.convert(motion.displacement + noisy(3 * i + 1, sample));
-            let felt = actuator.force_sensor.convert(answer + noisy(3 * i + 2, sample));
-            (rig.felt, rig.moved) = (felt, motion.displacement);
-            run.target[i][sample] = target.displacement;
-            run.command[i][sample] = sent;
-            run.measured[i][sample] = rig.measured;
-            run.force[i][sample] = felt;
+            let sent = rig.step(actuator, target, noise_of(noise, i, sample), rate);
+            rig.record(&mut run, i, sample, target.displacement, sent);
             let arrived = if rig.late.is_empty() {
-                felt
+                rig.felt
             } else {
-                std::mem::replace(&mut rig.late[sample % actuator.force_delay_samples], felt)
+                std::mem::replace(&mut rig.late[sample % actuator.force_delay_samples], rig.felt)
             };
             across_add(&mut force, actuator.dof, actuator.from_dof, -arrived);
         }
@@ -154,8 +195,7 @@ pub(crate) fn run(test: &VirtualTest, ground: &[f64], noise: &Noise, bound: f64)
             run.displacement[i][sample] = x[i];
             within &= x[i].abs() <= bound && a[i].is_finite();
         }
-        let heard = |rig: &Rig| rig.moved.abs() <= bound && rig.measured.is_finite() && rig.felt.is_finite();
-        if !within || !rigs.iter().all(heard) {
+        if !within || !rigs.iter().all(|rig| rig.is_within(bound)) {
             return Err(Error::Unstable { time_s: sample as f64 * dt, bound_m: bound });
         }
     }

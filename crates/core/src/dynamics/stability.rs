@@ -69,6 +69,9 @@ pub(crate) struct Loop {
 impl Loop {
     pub(crate) fn new(test: &VirtualTest) -> Result<Self> {
         let config = &test.config;
+        if test.is_alone() {
+            return Err(configuration("structure", "expected one for a critical delay, found none: no loop is closed"));
+        }
         let [actuator] = &config.actuators[..] else {
             let message = format!("expected one actuator for a critical delay, found {}", config.actuators.len());
             return Err(configuration("actuator", &message));

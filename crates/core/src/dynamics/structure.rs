@@ -36,6 +36,18 @@ pub struct Structure {
 }
 
 impl Structure {
+    /// No structure, of no degrees of freedom: its actuators follow a target that is given.
+    pub fn none() -> Self {
+        let empty = DMatrix::zeros(0, 0);
+        Self {
+            mass: empty.clone(),
+            damping: empty.clone(),
+            stiffness: empty,
+            influence: DVector::zeros(0),
+            natural_frequencies_hz: Vec::new(),
+        }
+    }
+
     /// One degree of freedom: k = m (2 pi f)^2, c = 2 zeta m (2 pi f).
     ///
     /// # Errors

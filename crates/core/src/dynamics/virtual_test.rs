@@ -1,9 +1,10 @@
-//! The virtual test: a structure split in two, its actuators between the parts.
+//! The virtual test: a structure split in two, its actuators between the parts; or no structure, its actuators alone.
 
 use nalgebra::{Cholesky, DMatrix};
 
 use super::actuator::{Actuator, Delay, across};
 use super::check::{Checks, Mistake, positive};
+use super::history::Motion;
 use super::law::Law;
 use super::stability::{CriticalDelay, DelayDamping, Loop};
 use super::structure::{Structure, lowest, modes};
@@ -48,7 +49,7 @@ impl Stepping {
 /// What is tested.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TestConfig {
-    /// The whole structure, elastic.
+    /// The whole structure, elastic; [`Structure::none`] where the actuators follow a target that is given.
     pub structure: Structure,
     /// Restoring forces of its numerical part.
     pub elements: Vec<Element>,
@@ -58,10 +59,12 @@ pub struct TestConfig {
     pub stepping: Stepping,
     /// Samples a second.
     pub rate_hz: f64,
-    /// `continuous`: largest change of target and measured, over their peaks, when the step is halved.
+    /// `continuous`: largest change of target and measured (and force, without a structure), over their peaks, when the step
+    /// is halved.
     pub tolerance: f64,
     /// Displacement at which the test stops as unstable, m; None: 1000 times the static one of the structure
-    /// when all has yielded (1000 m without a motion).
+    /// when all has yielded, or 1000 times the peak of a given target, times the largest gain above 1 (1000 m without a
+    /// motion).
     pub bound_m: Option<f64>,
 }
 
@@ -80,7 +83,8 @@ pub struct Run {
     pub displacement: Vec<Vec<f64>>,
     /// Internal steps a sample.
     pub steps_per_sample: usize,
-    /// Largest change of target and measured over their peaks on halving the step; NaN where the step is the sample.
+    /// Largest change of target and measured (and force, without a structure) over their peaks on halving the step; NaN where
+    /// the step is the sample.
     pub error_estimate: f64,
 }
 
@@ -95,6 +99,24 @@ impl Run {
             displacement: signals(n_dof),
             steps_per_sample,
             error_estimate: f64::NAN,
+        }
+    }
+}
+
+/// What drives a test, one value a sample.
+#[derive(Clone, Copy)]
+pub(crate) enum Drive<'a> {
+    /// A ground acceleration under the structure, m/s^2.
+    Ground(&'a [f64]),
+    /// What every actuator is to do where there is no structure to ask it.
+    Target(&'a [Motion]),
+}
+
+impl Drive<'_> {
+    pub(crate) fn len(&self) -> usize {
+        match self {
+            Drive::Ground(samples) => samples.len(),
+            Drive::Target(samples) => samples.len(),
         }
     }
 }
@@ -170,7 +192,10 @@ impl VirtualTest {
             stiffness: structure.stiffness.clone(),
         };
         let mut placed = true;
-        for (i, element) in config.elements.iter().enumerate() {
+        if n == 0 {
+            checks.demand("element", config.elements.is_empty(), "none without a structure", config.elements.len());
+        }
+        for (i, element) in config.elements.iter().enumerate().filter(|_| n > 0) {
             checks.under(&format!("element[{}]", i + 1), |checks| {
                 element.law.check(checks);
                 if config.stepping == Stepping::Cr {
@@ -187,6 +212,12 @@ impl VirtualTest {
         }
         for (i, actuator) in config.actuators.iter().enumerate() {
             checks.under(&format!("actuator[{}]", i + 1), |checks| {
+                if n == 0 {
+                    let late = actuator.force_delay_samples;
+                    checks.demand("force_delay_samples", late == 0, "0 without a structure that waits for it", late);
+                    return actuator.check(checks, config.stepping == Stepping::Cr, rate_hz);
+                }
+                actuator.check_specimen(checks);
                 actuator.check(checks, config.stepping == Stepping::Cr, rate_hz);
                 if !place(checks, actuator.dof, actuator.from_dof) {
                     placed = false;
@@ -197,7 +228,7 @@ impl VirtualTest {
                 }
             });
         }
-        if placed && checks.mistakes.is_empty() {
+        if n > 0 && placed && checks.mistakes.is_empty() {
             for (what, name, matrix, whole) in [
                 ("stiffness", "stiffness_n_per_m", &left.stiffness, &structure.stiffness),
                 ("damping", "damping_n_s_per_m", &left.damping, &structure.damping),
@@ -220,22 +251,10 @@ impl VirtualTest {
             return Err(Error::Configuration(checks.mistakes));
         }
         let load = (&structure.mass * &structure.influence).as_slice().to_vec();
-        let whole = whole(&config, &left);
-        let factor = Cholesky::new(whole.mass.clone())
-            .ok_or_else(|| configuration("structure.mass_kg", "expected a positive definite matrix"))?;
-        let omega = modes(&factor, &whole.stiffness).0;
+        let (omega, softest) = if n == 0 { (Vec::new(), Vec::new()) } else { frequencies(&config, &left)? };
         for actuator in &mut config.actuators {
             actuator.delay = actuator.delay.clone().plain();
         }
-        let mut yielded = left.stiffness.clone();
-        for element in &config.elements {
-            add_across(&mut yielded, element.dof, element.from_dof, element.law.lasting_stiffness());
-        }
-        for actuator in &config.actuators {
-            let lasting = actuator.specimen.iter().map(Law::lasting_stiffness).sum();
-            add_across(&mut yielded, actuator.dof, actuator.from_dof, lasting);
-        }
-        let softest = modes(&factor, &yielded).0;
         Ok(Self { config, numerical: left, load, omega, softest })
     }
 
@@ -265,11 +284,58 @@ impl VirtualTest {
     /// [`Error::NotFinite`] and [`Error::TooShort`] for the ground motion; [`Error::Configuration`] for a delay longer than
     /// it, or for noise of another length; [`Error::Unstable`] with the time at which a displacement left its bound.
     pub fn run(&self, ground: &[f64], noise: &Noise) -> Result<Run> {
+        if self.is_alone() {
+            return Err(configuration("structure", "expected one under a ground motion, found none"));
+        }
         if ground.len() < 2 {
             return Err(Error::TooShort { expected: 2, found: ground.len() });
         }
         crate::pair::check_finite(ground, crate::Signal::GroundMotion)?;
-        let duration = (ground.len() - 1) as f64 / self.config.rate_hz;
+        let duration = self.checked_duration(ground.len(), noise)?;
+        let bound = self.bound(ground, duration);
+        match self.config.stepping {
+            Stepping::Continuous => continuous::run(self, Drive::Ground(ground), noise, bound),
+            Stepping::Cr => sampled::run(self, ground, noise, bound),
+        }
+    }
+
+    /// Moves the actuators, which have no structure, along one target: its motion at every sample, after rest.
+    ///
+    /// `continuous` takes the polynomial of fifth degree through both samples in between. The first displacement should be
+    /// 0, from where the actuators begin.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run), of the target.
+    pub fn follow(&self, target: &[Motion], noise: &Noise) -> Result<Run> {
+        if !self.is_alone() {
+            return Err(configuration("structure", "expected none where the target is given, found one"));
+        }
+        if target.len() < 2 {
+            return Err(Error::TooShort { expected: 2, found: target.len() });
+        }
+        let sound = |m: &Motion| [m.displacement, m.velocity, m.acceleration].iter().all(|v| v.is_finite());
+        if let Some(first) = target.iter().position(|m| !sound(m)) {
+            let count = target.iter().filter(|m| !sound(m)).count();
+            return Err(Error::NotFinite { signal: crate::Signal::Target, count, first });
+        }
+        self.checked_duration(target.len(), noise)?;
+        let peak = target.iter().fold(0.0, |peak: f64, m| peak.max(m.displacement.abs()));
+        let gain = self.config.actuators.iter().fold(1.0, |most: f64, a| most.max(a.gain.abs()));
+        let bound = self.config.bound_m.unwrap_or(if peak == 0.0 { BOUND } else { BOUND * gain * peak });
+        match self.config.stepping {
+            Stepping::Continuous => continuous::run(self, Drive::Target(target), noise, bound),
+            Stepping::Cr => sampled::follow(self, target, noise, bound),
+        }
+    }
+
+    /// Whether there is no structure.
+    pub(crate) fn is_alone(&self) -> bool {
+        self.config.structure.n_dof() == 0
+    }
+
+    /// Seconds from the first sample to the last, if delays and noise go with them.
+    fn checked_duration(&self, n_samples: usize, noise: &Noise) -> Result<f64> {
+        let duration = (n_samples - 1) as f64 / self.config.rate_hz;
         let mut checks = Checks::default();
         for (i, actuator) in self.config.actuators.iter().enumerate() {
             let longest = actuator.delay.range().1;
@@ -277,16 +343,9 @@ impl VirtualTest {
             checks.demand(&key, longest < duration, &format!("less than the test's {duration} s"), longest);
         }
         for channel in noise.iter().flatten() {
-            checks.demand("noise", channel.len() == ground.len(), &format!("{} samples", ground.len()), channel.len());
+            checks.demand("noise", channel.len() == n_samples, &format!("{n_samples} samples"), channel.len());
         }
-        if !checks.mistakes.is_empty() {
-            return Err(Error::Configuration(checks.mistakes));
-        }
-        let bound = self.bound(ground, duration);
-        match self.config.stepping {
-            Stepping::Continuous => continuous::run(self, ground, noise, bound),
-            Stepping::Cr => sampled::run(self, ground, noise, bound),
-        }
+        if checks.mistakes.is_empty() { Ok(duration) } else { Err(Error::Configuration(checks.mistakes)) }
     }
 
     fn bound(&self, ground: &[f64], duration: f64) -> f64 {
@@ -344,6 +403,22 @@ impl Element {
 
 pub(crate) fn configuration(key: &str, message: &str) -> Error {
     Error::Configuration(vec![Mistake { key: key.into(), message: message.into() }])
+}
+
+/// Circular frequencies of structure and specimens together, elastic, and when all has yielded.
+fn frequencies(config: &TestConfig, left: &Numerical) -> Result<(Vec<f64>, Vec<f64>)> {
+    let whole = whole(config, left);
+    let factor = Cholesky::new(whole.mass.clone())
+        .ok_or_else(|| configuration("structure.mass_kg", "expected a positive definite matrix"))?;
+    let mut yielded = left.stiffness.clone();
+    for element in &config.elements {
+        add_across(&mut yielded, element.dof, element.from_dof, element.law.lasting_stiffness());
+    }
+    for actuator in &config.actuators {
+        let lasting = actuator.specimen.iter().map(Law::lasting_stiffness).sum();
+        add_across(&mut yielded, actuator.dof, actuator.from_dof, lasting);
+    }
+    Ok((modes(&factor, &whole.stiffness).0, modes(&factor, &yielded).0))
 }
 
 fn with_elements(config: &TestConfig, left: &Numerical) -> Numerical {
