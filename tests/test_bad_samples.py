@@ -364,3 +364,20 @@ def test_what_is_no_channel_is_one_line(target: object, measured: object, messag
         rthstrack.assess(target, measured, 500.0)  # type: ignore[arg-type]
     with pytest.raises(rthstrack.SettingError, match="rate_hz must be a number"):
         rthstrack.assess(np.zeros(8), np.zeros(8), "fast")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("share", [0.003, 0.01])
+def test_noise_in_both_channels_at_once_leaves_no_interval(share: float) -> None:
+    t = np.arange(8000) / 1000
+    rng = np.random.default_rng(3)
+    common, own = share * rng.normal(size=t.size), share / 2 * rng.normal(size=t.size)
+
+    def motion(at: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray((np.sin(2 * np.pi * 1.1 * at) + 0.5 * np.sin(2 * np.pi * 2.7 * at)) / 0.79)
+
+    found = rthstrack.evaluate(motion(t) + common, motion(t - 0.012) + common + own, 1000.0, **TRUSTED)
+    assert abs(found.delay_s - 0.012) < 1e-4
+    assert np.isnan(found.delay_interval_s).all()
+    # The same on the target alone is measured and taken off: there the interval stays.
+    alone = rthstrack.evaluate(motion(t) + common, motion(t - 0.012) + own, 1000.0, **TRUSTED)
+    assert np.isfinite(alone.delay_interval_s).all()

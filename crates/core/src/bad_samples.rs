@@ -498,9 +498,7 @@ impl Examination {
                     && run.goes_beyond(if side == 0 { -1.0 } else { 1.0 }, own, channel == 0)
                 {
                     clipped[side] = true;
-                } else if run.moved() > if may_be_chance { least } else { 0.5 * least }
-                    && (channel == 1 || b - a < SHORT || run.goes_on(0.25 * least))
-                {
+                } else if run.moved() > if may_be_chance { least } else { 0.5 * least } {
                     let mut ends = run.ends();
                     // A command that steps is followed in the end.
                     let left_alone = channel == 1 || run.is_left_alone(ends.jumps);
@@ -509,6 +507,8 @@ impl Examination {
                     }
                     // In numbers as fine as these nothing is equal by chance.
                     let by_fineness = channel == 0 && left_alone && !coarse && own.equal < 0.1 && run.moved() > least;
+                    // Without a jump it may have come to rest before the other one did.
+                    let rests = channel == 0 && b - a >= SHORT && !run.goes_on(0.25 * least);
                     match ends {
                         Ends { enters: true, leaves, .. }
                             if leaves || run.parts(least.max(2.0 * other.apart), channel == 0) =>
@@ -528,7 +528,7 @@ impl Examination {
                             marks[a..b].fill(1 + BadKind::Dropout as u8);
                         }
                         Ends { enters: false, leaves: false, .. }
-                            if a > 0 || (channel == 1 && run.moved() > 2.0 * own.deviation) =>
+                            if !rests && (a > 0 || (channel == 1 && run.moved() > 2.0 * own.deviation)) =>
                         {
                             if by_fineness || (by_noise && run.is_alone()) {
                                 marks[second..b].fill(1 + BadKind::Frozen as u8);

@@ -98,12 +98,29 @@ pub(crate) fn followed(target: &[f64], measured: &[f64], lag: f64, gain: f64) ->
     std::iter::once(lag).chain(between).map(|lag| followed_at(target, measured, lag, gain)).fold(0.0, f64::max)
 }
 
+/// Whether the highest frequencies are in both channels at the same instant and as large, though measured comes `lag` samples
+/// later: noise of the wiring, not motion. An actuator that answers them at once answers them less.
+pub(crate) fn is_common(target: &[f64], measured: &[f64], lag: f64, gain: f64) -> bool {
+    lag.abs() >= LEAST_APART
+        && alike_at(target, measured, 0.0).is_some_and(|(size, _)| size.abs() > COMMON)
+        && followed_at(target, measured, lag, gain) < COMMON
+}
+
 fn followed_at(target: &[f64], measured: &[f64], lag: f64, gain: f64) -> f64 {
+    alike_at(target, measured, lag).map_or(0.0, |(size, correlation)| {
+        // By measured's gain at these frequencies, which may be lower than elsewhere; the squared correlation needs none.
+        (BETWEEN * size / gain).max((BETWEEN * correlation).powi(2)).min(1.0)
+    })
+}
+
+/// How much of the target's differences is in measured `lag` samples later, as a factor, and their correlation; None where it is
+/// not clear of chance.
+fn alike_at(target: &[f64], measured: &[f64], lag: f64) -> Option<(f64, f64)> {
     let n = target.len().min((target.len() / 2).clamp(LEAST_COMPARED, MOST_COMPARED));
     let base = lag.floor() as isize - 1;
     let margin = base.unsigned_abs() + LAGS;
     if n < 2 * margin + STRIP + ORDER {
-        return 0.0;
+        return None;
     }
     let from = (target.len() - n) / 2 + margin;
     let to = from + n - 2 * margin - ORDER;
@@ -111,12 +128,12 @@ fn followed_at(target: &[f64], measured: &[f64], lag: f64, gain: f64) -> f64 {
     let most = products.iter().fold(0.0, |m: f64, p| m.max(p.abs()));
     let chance = CLEAR / (INDEPENDENT * (to - from) as f64).sqrt();
     let correlation = most / (own * other).sqrt();
-    if correlation.is_nan() || correlation <= ALIKE.max(chance) {
-        return 0.0;
-    }
-    // By measured's gain at these frequencies, which may be lower than elsewhere; the squared correlation needs none.
-    (BETWEEN * most / (gain * own)).max((BETWEEN * correlation).powi(2)).min(1.0)
+    (correlation > ALIKE.max(chance)).then(|| (most / own, correlation))
 }
+
+/// Noise is in both where they share so much of it; and the delay is so many samples.
+const COMMON: f64 = 0.4;
+const LEAST_APART: f64 = 3.0;
 
 /// Energies of the differences of both, and sums of products at each lag.
 #[derive(Default)]

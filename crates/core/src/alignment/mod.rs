@@ -526,7 +526,12 @@ impl Alignment {
         state.target_noise = 0.0;
         // Where noise leaves no number, what the target would give were it exact tells where to look.
         let Ok(about) = noisy.or_else(|_| self.judge(state, view, start, expected)) else { return noisy };
-        let followed = floor::followed(target, measured, about.delay_s * self.rate_hz, about.amplitude);
+        let lag = about.delay_s * self.rate_hz;
+        if floor::is_common(target, measured, lag, about.amplitude) {
+            let found = noisy.unwrap_or(about);
+            return Ok(found.without_interval(Reason::ColouredTargetNoise { share: high.min(1.0) }));
+        }
+        let followed = floor::followed(target, measured, lag, about.amplitude);
         if followed == 0.0 {
             return noisy;
         }
