@@ -1,6 +1,6 @@
 use std::borrow::Cow;
 
-use crate::TextError;
+use crate::error::TextError;
 
 /// How the bytes of a file spell characters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
