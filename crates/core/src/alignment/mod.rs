@@ -23,7 +23,7 @@ use pulp::{Arch, Simd, WithSimd};
 use crate::alignment::grid::Grid;
 use crate::alignment::products::{Cross, Multiply, Products};
 use crate::alignment::weighting::{Energies, Weighting};
-use crate::bad_samples::{About, BadSamples, Examination};
+use crate::bad_samples::{About, Examination};
 use crate::causal::CausalDecimator;
 use crate::error::Result;
 use crate::floor;
@@ -33,9 +33,11 @@ use crate::noise::{
     Autoregression, Changes, Influence, MAX_ORDER, NoisyTarget, Precision, Sampling, Spread, SpreadState, cell_width,
 };
 use crate::reason::Reason;
+use crate::settings::{Estimator, EvaluatorConfig, Noise};
 use crate::spectrum::{Scratch, SpectrumConfig};
 use crate::sums;
-use crate::tracking::{Estimator, EvaluatorConfig, Noise, Tracking, centroid, weigh};
+use crate::tracking::Tracking;
+use crate::weigh::{centroid, weigh};
 use crate::window::{Detrend, Window};
 
 /// Newton's steps at most.
@@ -1570,19 +1572,6 @@ impl Alignment {
         tracking.delay_std_s = delay_std;
         tracking.delay_interval_s = (tracking.delay_s - delay_reach, tracking.delay_s + delay_reach);
         tracking
-    }
-
-    /// The bad samples of a whole record; None where there are none, or they are kept.
-    pub(crate) fn examined(pair: &crate::Pair<'_>, config: &EvaluatorConfig) -> Option<Examination> {
-        let search = Search::new(pair.n_samples(), pair.rate_hz(), config.max_delay_s);
-        let view = View::whole(pair);
-        let mut examination = Examination::default();
-        let about = |signals: [&[f64]; 2]| {
-            let [target, measured] = signals;
-            About::find(&search, &mut search.state(), &View { target, measured, ..view }, 0)
-        };
-        (config.bad_samples == BadSamples::LeaveOut && examination.examine([view.target, view.measured], about))
-            .then_some(examination)
     }
 
     /// The delay of the whole record, in samples, as far as it can be told: of the only peak of the correlation, or of the one
