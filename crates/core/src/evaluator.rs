@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use num_complex::Complex;
 
-use crate::alignment::{Alignment, AlignmentState};
+use crate::alignment::{Alignment, AlignmentState, Judged};
 use crate::bad_samples::{BadFound, BadSamples, Examination};
 use crate::decimate::{Chebyshev, Decimator, Stream};
 use crate::error::{Error, Result, Signal};
@@ -199,10 +199,10 @@ impl Evaluator {
     fn shifted(&self, state: &mut EvaluatorState, pair: &Pair<'_>, start: usize) -> Option<Result<Tracking>> {
         let EvaluatorState { alignment: state, examination, .. } = state;
         let (alignment, state) = self.alignment.as_ref().zip(state.as_mut())?;
-        let view = View::whole(pair);
+        let judged = Judged::new(View::whole(pair), start, self.expected());
         let estimate = |()| match self.config.bad_samples {
-            BadSamples::LeaveOut => alignment.estimate_examined(state, examination, &view, start, self.expected()),
-            BadSamples::Keep => alignment.estimate(state, &view, start, self.expected()),
+            BadSamples::LeaveOut => alignment.estimate_examined(state, examination, &judged),
+            BadSamples::Keep => alignment.estimate(state, &judged),
         };
         Some(pair.check_fourth_powers().map(estimate))
     }
@@ -426,7 +426,8 @@ impl Moving<'_> {
     pub(crate) fn at(&mut self, start: usize) -> Result<Tracking> {
         let Self { evaluator, state, pair, streams, examination, expected } = self;
         if let (Some(alignment), Some(state)) = (&evaluator.alignment, &mut state.alignment) {
-            return Ok(alignment.estimate(state, &view(pair, examination.as_ref()), start, *expected));
+            let judged = Judged::new(view(pair, examination.as_ref()), start, *expected);
+            return Ok(alignment.estimate(state, &judged));
         }
         let range = start..start + evaluator.n_samples;
         let window = Pair::new(&pair.target()[range.clone()], &pair.measured()[range], pair.rate_hz())?;

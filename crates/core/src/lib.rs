@@ -14,7 +14,7 @@
 //! 7. [`bad_samples`]: spikes, dropouts, frozen, clipped and held samples, which the next step leaves out.
 //! 8. `alignment`: the estimators that shift the target before it is windowed; `lag` finds where to start, `lagrange` reads
 //!    between samples, `floor` tells how noisy the target is, `noise` gives the intervals.
-//! 9. [`evaluator`]: all of that behind one door: [`Evaluator`] is the plan, [`EvaluatorState`] its buffers.
+//! 9. [`evaluator`]: whichever estimator, [`Evaluator`] is the plan, [`EvaluatorState`] its buffers.
 //! 10. [`moving`]: the same over moving windows.
 //! 11. [`monitor`]: the same while the test runs, sample by sample; [`causal`] is its P.
 //! 12. [`factors`]: the largest P and Q that a tolerance allows.
