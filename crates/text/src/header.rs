@@ -118,7 +118,7 @@ fn refuse_broken_row(row: &Row, rows: &[Row], dialect: &Dialect) -> Result<(), T
     }
     for at in 0..n_required {
         let found = dialect.kind(&cells[at]);
-        let found_text = || error::shown(&cells[at]);
+        let found_text = || encoding::shown(&cells[at]);
         match dialect.kinds[at] {
             Kind::Number if !matches!(found, Kind::Number | Kind::Nothing) => {
                 return Err(TextError::NotANumber { line, column: column(at), found: found_text() });

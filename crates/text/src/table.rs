@@ -1,7 +1,7 @@
 use crate::delimiter::Delimiter;
 use crate::dialect::{self, Dialect, Kind};
 use crate::encoding::{self, Encoding};
-use crate::error::{self, TextError};
+use crate::error::TextError;
 use crate::header::{self, HeadLine, Header, column_name};
 use crate::line::{Lines, after_end, field_end, fields, is_blank, is_end, uncommented, unquoted};
 use crate::number;
@@ -285,7 +285,7 @@ impl Rows {
                 let field = text[at..end].trim_ascii();
                 empty &= field.is_empty();
                 sink.take(field, n_rows, point, order).map_err(|wrong| {
-                    let (column, found) = (column_name(names, column), error::shown(field));
+                    let (column, found) = (column_name(names, column), encoding::shown(field));
                     match wrong {
                         Wrong::NotANumber => TextError::NotANumber { line, column, found },
                         Wrong::NotATime => TextError::NotATime { line, column, found },
