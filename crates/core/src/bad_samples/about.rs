@@ -88,11 +88,13 @@ impl<'a> Other<'a> {
         }
     }
 
+    #[inline]
     pub(super) fn index(&self, i: isize) -> isize {
         i + self.shift
     }
 
     /// Whether it jumps by more than `least` from one sample to the next, where this channel is at sample i, or about there.
+    #[inline]
     pub(super) fn jumps(&self, i: usize, least: f64) -> bool {
         let reach = 32 + 2 * self.shift.abs();
         let from = (self.index(i as isize) - reach).max(0) as usize;
@@ -100,6 +102,7 @@ impl<'a> Other<'a> {
         from < to && self.signal[from..to].windows(2).any(|w| (self.scale * (w[1] - w[0])).abs() > least)
     }
 
+    #[inline]
     pub(super) fn at(&self, i: usize) -> Option<f64> {
         let at = usize::try_from(self.index(i as isize)).ok()?;
         Some(self.scale * self.signal.get(at)? + self.offset)

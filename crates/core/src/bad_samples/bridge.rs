@@ -9,6 +9,7 @@ pub(super) const GOOD: u8 = 0;
 
 /// A straight line from good to good sample in place of what is marked in `range`, of one sample a cubic; of ends, the nearest
 /// good one.
+#[inline]
 pub(super) fn bridge(signal: &mut [f64], marks: &[u8], range: Range<usize>) {
     let n = signal.len();
     let mut a = range.start;

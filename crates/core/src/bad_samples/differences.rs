@@ -42,6 +42,7 @@ pub(super) fn spread_of(around: &[f64]) -> (f64, f64) {
 }
 
 /// The median of |spread| over a block.
+#[inline]
 pub(super) fn median(signal: &[f64], range: &Range<usize>, spread: fn(&[f64], usize) -> f64) -> f64 {
     let mut values = [0.0; BLOCK];
     let mut k = 0;
@@ -53,6 +54,7 @@ pub(super) fn median(signal: &[f64], range: &Range<usize>, spread: fn(&[f64], us
 }
 
 /// The middle value; 0 of none.
+#[inline]
 pub(super) fn middle(values: &mut [f64]) -> f64 {
     let half = values.len() / 2;
     if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(half, f64::total_cmp).1 }
