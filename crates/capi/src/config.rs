@@ -2,9 +2,11 @@
 
 use rthstrack::{Detrend, Estimator, MonitorConfig, Window};
 
-use crate::RTHSTRACK_ABI_VERSION;
 use crate::boundary::{guarded, is_sound_out};
 use crate::status::rthstrack_status::{self, *};
+
+/// The interface that this header describes; see rthstrack_abi_version.
+pub const RTHSTRACK_ABI_VERSION: u32 = 1;
 
 /// Window over the samples.
 #[repr(i32)]

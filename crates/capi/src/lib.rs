@@ -34,16 +34,13 @@ pub mod monitor;
 pub mod actuator;
 
 pub use config::{
-    rthstrack_detrend, rthstrack_estimator, rthstrack_monitor_config, rthstrack_monitor_config_default,
-    rthstrack_window,
+    RTHSTRACK_ABI_VERSION, rthstrack_detrend, rthstrack_estimator, rthstrack_monitor_config,
+    rthstrack_monitor_config_default, rthstrack_window,
 };
 pub use reading::rthstrack_reading;
 pub use status::{rthstrack_reason, rthstrack_reason_text, rthstrack_status, rthstrack_status_text};
 
 use std::ffi::{CStr, c_char};
-
-/// The interface that this header describes; see rthstrack_abi_version.
-pub const RTHSTRACK_ABI_VERSION: u32 = 1;
 
 const VERSION: &CStr = match CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes()) {
     Ok(version) => version,

@@ -3,8 +3,6 @@
 
 use std::fmt;
 
-use crate::dynamics::Mistake;
-
 /// Which signal of a pair an error speaks of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Signal {
@@ -26,6 +24,21 @@ impl fmt::Display for Signal {
             Signal::Force => "force",
             Signal::GroundMotion => "ground motion",
         })
+    }
+}
+
+/// One thing wrong with a configuration.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mistake {
+    /// Where: `actuator[1].delay_s`, numbered from 1.
+    pub key: String,
+    /// What was expected and found.
+    pub message: String,
+}
+
+impl fmt::Display for Mistake {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.key, self.message)
     }
 }
 

@@ -31,10 +31,13 @@ use rustfft::FftPlanner;
 
 use crate::decimate::Decimator;
 use crate::error::{Error, Result};
+use crate::evaluator::{Evaluator, EvaluatorState};
 use crate::pair::Pair;
+use crate::settings::EvaluatorConfig;
 use crate::spectrum::{Bins, Sink};
 use crate::sums;
-use crate::tracking::{Evaluator, EvaluatorConfig, EvaluatorState, Sums, Term, Tracking, weight};
+use crate::tracking::Tracking;
+use crate::weigh::{Sums, Term, weight};
 
 /// Below this phase (0.06 degrees, 0.16 ms at 1 Hz) the tolerance is on the phase, in radians.
 pub const NEAR_ZERO_RAD: f64 = 1e-3;

@@ -24,8 +24,11 @@ use pulp::{Arch, Simd, WithSimd};
 
 use crate::decimate::Decimator;
 use crate::error::{Error, Result};
+use crate::evaluator::{Evaluator, EvaluatorState};
 use crate::pair::Pair;
-use crate::tracking::{Evaluator, EvaluatorConfig, EvaluatorState, Sums, Term, Tracking};
+use crate::settings::EvaluatorConfig;
+use crate::tracking::Tracking;
+use crate::weigh::{Sums, Term};
 
 /// Bins that are summed side by side.
 const GROUP: usize = 8;

@@ -9,17 +9,19 @@
 //! 2. [`window`]: detrending and windows.
 //! 3. [`decimate`]: P, as a short cascade or as the paper's Chebyshev filter.
 //! 4. `spectrum`: Q by folding, the transform, the kept bins.
-//! 5. [`tracking`]: Eqs 6-12, amplitude and delay; [`Evaluator`] is the plan, [`EvaluatorState`] its buffers.
-//! 6. [`bad_samples`]: spikes, dropouts, frozen, clipped and held samples, which the next step leaves out.
-//! 7. `alignment`: the estimators that shift the target before it is windowed; `lag` finds where to start, `lagrange` reads
-//!    between samples, `floor` tells how noisy the target is, `noise` gives the intervals, [`reason`] says why there is none.
-//! 8. [`moving`]: the same over moving windows.
-//! 9. [`monitor`]: the same while the test runs, sample by sample; [`causal`] is its P.
-//! 10. [`factors`]: the largest P and Q that a tolerance allows.
-//! 11. [`key_frequencies`]: the few bins that hold most of the weight, evaluated alone.
-//! 12. [`response`]: gain, phase, delay and coherence over frequency, with intervals.
-//! 13. [`slopes`]: the same as two straight lines.
-//! 14. [`mod@indices`]: the time-domain indices in use beside them.
+//! 5. [`settings`]: what an evaluation is told; [`tracking`]: what it answers; [`reason`]: why a number is missing.
+//! 6. `weigh`: the sums of Eqs 7 and 12, amplitude and delay from them (Eqs 10 and 11).
+//! 7. [`bad_samples`]: spikes, dropouts, frozen, clipped and held samples, which the next step leaves out.
+//! 8. `alignment`: the estimators that shift the target before it is windowed; `lag` finds where to start, `lagrange` reads
+//!    between samples, `floor` tells how noisy the target is, `noise` gives the intervals.
+//! 9. [`evaluator`]: whichever estimator, [`Evaluator`] is the plan, [`EvaluatorState`] its buffers.
+//! 10. [`moving`]: the same over moving windows.
+//! 11. [`monitor`]: the same while the test runs, sample by sample; [`causal`] is its P.
+//! 12. [`factors`]: the largest P and Q that a tolerance allows.
+//! 13. [`key_frequencies`]: the few bins that hold most of the weight, evaluated alone.
+//! 14. [`response`]: gain, phase, delay and coherence over frequency, with intervals.
+//! 15. [`slopes`]: the same as two straight lines.
+//! 16. [`mod@indices`]: the time-domain indices in use beside them.
 //!
 //! [`dynamics`] makes such signals: virtual tests of structures with actuators that lag. It and the evaluation do not know
 //! each other.
@@ -34,6 +36,7 @@ pub mod causal;
 pub mod decimate;
 pub mod dynamics;
 pub mod error;
+pub mod evaluator;
 pub mod factors;
 mod floor;
 pub mod indices;
@@ -47,16 +50,19 @@ pub mod pair;
 mod quantile;
 pub mod reason;
 pub mod response;
+pub mod settings;
 pub mod slopes;
 mod spectrum;
 mod sums;
 pub mod tracking;
+mod weigh;
 pub mod window;
 
 pub use bad_samples::{BAD_KINDS, BadCount, BadFound, BadKind, BadSamples, bridged};
 pub use causal::{CausalDecimator, CausalState};
 pub use decimate::Decimator;
 pub use error::{Error, Result, Signal};
+pub use evaluator::{Evaluator, EvaluatorState};
 pub use factors::{DelayMeasure, FactorChange, Factors, FactorsConfig, PriorBounds, choose_factors, prior_bounds};
 pub use indices::{IndexHistories, Indices, index_histories, indices};
 pub use key_frequencies::{KeyFrequencies, KeyFrequenciesConfig, KeyFrequenciesState};
@@ -65,6 +71,7 @@ pub use moving::{MovingConfig, MovingTracking, evaluate_moving};
 pub use pair::Pair;
 pub use reason::Reason;
 pub use response::{FrequencyResponse, ResponseConfig, Unaligned, frequency_response};
+pub use settings::{Estimator, EvaluatorConfig, Noise};
 pub use slopes::{FrequencySlopes, Slope, SlopesConfig, frequency_slopes};
-pub use tracking::{Estimator, Evaluator, EvaluatorConfig, EvaluatorState, Noise, Spectra, Tracking};
+pub use tracking::{Spectra, Tracking};
 pub use window::{Detrend, Window};

@@ -12,10 +12,12 @@
 use crate::causal::{CausalDecimator, CausalState, Ring};
 use crate::decimate::Decimator;
 use crate::error::{Error, Result};
+use crate::evaluator::{Evaluator, EvaluatorState};
 use crate::pair::{MIN_SAMPLES, Pair, check_rate, is_fourth_power};
 use crate::reason::Reason;
+use crate::settings::{Estimator, EvaluatorConfig, check_expected_delay};
 use crate::sums;
-use crate::tracking::{Estimator, Evaluator, EvaluatorConfig, EvaluatorState, Tracking, check_expected_delay};
+use crate::tracking::Tracking;
 use crate::window::{Detrend, Window};
 
 /// Samples after decimation that the windows of all actuators may hold.

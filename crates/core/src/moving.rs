@@ -2,9 +2,11 @@
 
 use crate::bad_samples::BadFound;
 use crate::error::{Error, Result};
+use crate::evaluator::Evaluator;
 use crate::pair::{MIN_SAMPLES, Pair};
 use crate::reason::Reason;
-use crate::tracking::{Estimator, Evaluator, EvaluatorConfig, Tracking};
+use crate::settings::{Estimator, EvaluatorConfig};
+use crate::tracking::Tracking;
 
 /// The user's numbers for a moving evaluation.
 #[derive(Debug, Clone, Copy, PartialEq)]

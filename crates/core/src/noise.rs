@@ -374,7 +374,26 @@ pub(crate) struct Precision {
     pub(crate) coherent: bool,
 }
 
-/// Adds up, cell by cell, what is needed of the bins. `cosines` are those of the bins' frequencies in radians a sample.
+/// The bins that are kept.
+#[derive(Clone, Copy)]
+pub(crate) struct KeptBins<'a> {
+    /// Index of the first.
+    pub(crate) first: usize,
+    /// Of their frequencies, in radians a sample.
+    pub(crate) cosines: &'a Cosines,
+    /// What makes good their droop.
+    pub(crate) correction: Option<&'a [f64]>,
+}
+
+/// What is known of the noise: of measured's, and of the target's where it has some.
+#[derive(Clone, Copy)]
+pub(crate) struct Disturbance<'a> {
+    pub(crate) autoregression: Autoregression,
+    pub(crate) changes: Changes,
+    pub(crate) target: Option<NoisyTarget<'a>>,
+}
+
+/// Adds up, cell by cell, what is needed of the bins.
 pub(crate) struct Spread<'a> {
     cells: &'a mut [Cell],
     width: usize,
@@ -419,18 +438,15 @@ impl SpreadState {
 }
 
 impl<'a> Spread<'a> {
-    /// `first` is the index of the first kept bin.
     pub(crate) fn new(
         state: &'a mut SpreadState,
-        first: usize,
-        cosines: &'a Cosines,
-        correction: Option<&'a [f64]>,
-        noise: &Autoregression,
+        kept: KeptBins<'a>,
+        noise: Disturbance<'a>,
         influence: Influence,
         sampling: Sampling,
-        noisy_target: Option<NoisyTarget<'a>>,
-        changes: Changes,
     ) -> Self {
+        let KeptBins { first, cosines, correction } = kept;
+        let Disturbance { autoregression, changes, target: noisy_target } = noise;
         let width = cell_width(sampling.bins_per_piece * changes.alike()).max(cosines.len().div_ceil(MAX_CELLS));
         let cells = &mut state.0[..cosines.len().div_ceil(width)];
         cells.fill(Cell::default());
@@ -440,8 +456,8 @@ impl<'a> Spread<'a> {
             first,
             cosines,
             correction,
-            whitening: noise.response(),
-            coloured: noise.order > 0,
+            whitening: autoregression.response(),
+            coloured: autoregression.order > 0,
             influence,
             forms: influence.forms(),
             sampling,

@@ -29,11 +29,13 @@ use std::ops::Range;
 use num_complex::Complex;
 
 use crate::error::{Error, Result};
+use crate::evaluator::Evaluator;
 use crate::pair::Pair;
 use crate::quantile::student_t_975;
 use crate::reason::Reason;
+use crate::settings::{Estimator, EvaluatorConfig};
 use crate::spectrum::{Bins, Sink, Spectrum, SpectrumConfig, SpectrumState};
-use crate::tracking::{Estimator, Evaluator, EvaluatorConfig, delay};
+use crate::tracking::delay;
 use crate::window::{Detrend, Window};
 
 /// Shortest segment that is worth a spectrum.

@@ -29,6 +29,7 @@ type Arrays<'py> = (
 );
 
 #[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "they are the call's from Python")]
 pub(crate) fn evaluate_moving<'py>(
     py: Python<'py>,
     target: PyReadonlyArray1<'py, f64>,

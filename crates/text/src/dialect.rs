@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use crate::delimiter::Delimiter;
 use crate::line::{Lines, each_field, is_blank, uncommented, unquoted};
+use crate::number;
 use crate::stamp::{self, Order};
-use crate::{Delimiter, number};
 
 /// How much text each of the three samples (start, middle, end) takes.
 const SAMPLE: usize = 48 * 1024;
@@ -205,7 +206,7 @@ fn inked(field: &[u8]) -> usize {
 #[cfg(test)]
 mod tests {
     use super::{Kind, find};
-    use crate::Delimiter;
+    use crate::delimiter::Delimiter;
 
     fn found(text: &str) -> (Delimiter, char, usize) {
         let dialect = find(text.as_bytes()).unwrap_or_else(|| panic!("{text}"));

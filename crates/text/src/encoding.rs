@@ -1,6 +1,6 @@
 use std::borrow::Cow;
 
-use crate::TextError;
+use crate::error::{TextError, short};
 
 /// How the bytes of a file spell characters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,6 +67,14 @@ pub(crate) fn text(piece: &[u8]) -> Cow<'_, str> {
         Ok(valid) => Cow::Borrowed(valid),
         Err(_) => Cow::Owned(piece.iter().map(|&b| char::from(b)).collect()),
     }
+}
+
+/// A field as an error message shows it: one line, shortened, quoted.
+pub(crate) fn shown(field: &[u8]) -> String {
+    if field.is_empty() {
+        return "nothing".to_owned();
+    }
+    format!("'{}'", short(&text(field)))
 }
 
 fn is_utf8(piece: &[u8]) -> bool {

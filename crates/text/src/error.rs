@@ -109,14 +109,6 @@ impl fmt::Display for TextError {
 
 impl std::error::Error for TextError {}
 
-/// A field as an error message shows it: one line, shortened, quoted.
-pub(crate) fn shown(field: &[u8]) -> String {
-    if field.is_empty() {
-        return "nothing".to_owned();
-    }
-    format!("'{}'", short(&crate::encoding::text(field)))
-}
-
 /// At most 40 characters, control characters escaped.
 pub(crate) fn short(text: &str) -> String {
     let mut short: String = text.chars().take(40).flat_map(char::escape_debug).collect();

@@ -1,9 +1,10 @@
 //! The lines above the numbers: names and units of the columns.
 
+use crate::delimiter::Delimiter;
 use crate::dialect::{Dialect, Kind};
+use crate::encoding;
+use crate::error::{self, TextError};
 use crate::line::{fields, is_blank, uncommented, unquoted};
-use crate::table::column_name;
-use crate::{Delimiter, TextError, encoding, error};
 
 /// A line above the numbers.
 pub(crate) struct HeadLine<'a> {
@@ -117,7 +118,7 @@ fn refuse_broken_row(row: &Row, rows: &[Row], dialect: &Dialect) -> Result<(), T
     }
     for at in 0..n_required {
         let found = dialect.kind(&cells[at]);
-        let found_text = || error::shown(&cells[at]);
+        let found_text = || encoding::shown(&cells[at]);
         match dialect.kinds[at] {
             Kind::Number if !matches!(found, Kind::Number | Kind::Nothing) => {
                 return Err(TextError::NotANumber { line, column: column(at), found: found_text() });
@@ -268,4 +269,12 @@ fn is_unit(cell: &str) -> bool {
     ];
     let bracketed = |open, close| cell.starts_with(open) && cell.ends_with(close);
     bracketed('(', ')') || bracketed('[', ']') || UNITS.contains(&cell.to_lowercase().as_str())
+}
+
+/// What messages call a column.
+pub(crate) fn column_name(names: &[String], column: usize) -> String {
+    match names.get(column) {
+        Some(name) if !name.is_empty() => error::short(name),
+        _ => format!("column {column}"),
+    }
 }

@@ -15,6 +15,7 @@
 //! Every row counts: a ragged row or a word among numbers is an error with its line, never left out. Every number has
 //! exactly the value that `str::parse::<f64>` gives its token. No input makes this crate panic.
 
+mod delimiter;
 mod dialect;
 mod encoding;
 mod error;
@@ -24,45 +25,7 @@ mod number;
 mod stamp;
 mod table;
 
+pub use delimiter::Delimiter;
 pub use encoding::Encoding;
 pub use error::TextError;
 pub use table::{Column, MISSING_STAMP, Table, Values, read};
-
-/// What stands between two fields of a row.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Delimiter {
-    /// A tab.
-    Tab,
-    /// A semicolon.
-    Semicolon,
-    /// A comma.
-    Comma,
-    /// A vertical bar.
-    Bar,
-    /// Any number of blanks and tabs.
-    Blanks,
-}
-
-impl Delimiter {
-    /// The word for it in messages.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Tab => "tab",
-            Self::Semicolon => "semicolon",
-            Self::Comma => "comma",
-            Self::Bar => "'|'",
-            Self::Blanks => "blanks",
-        }
-    }
-
-    #[inline]
-    fn is(self, byte: u8) -> bool {
-        match self {
-            Self::Tab => byte == b'\t',
-            Self::Semicolon => byte == b';',
-            Self::Comma => byte == b',',
-            Self::Bar => byte == b'|',
-            Self::Blanks => byte == b' ' || byte == b'\t',
-        }
-    }
-}

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use crate::Delimiter;
+use crate::delimiter::Delimiter;
 
 /// The lines of a piece of text, ended by LF, CR LF or CR, without their ends.
 pub(crate) struct Lines<'a> {
@@ -132,7 +132,7 @@ pub(crate) fn unquoted(field: &[u8]) -> Cow<'_, [u8]> {
 #[cfg(test)]
 mod tests {
     use super::{Lines, fields, unquoted};
-    use crate::Delimiter;
+    use crate::delimiter::Delimiter;
 
     #[test]
     fn lines_end_with_any_of_the_three_customs() {

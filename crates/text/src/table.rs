@@ -1,8 +1,11 @@
+use crate::delimiter::Delimiter;
 use crate::dialect::{self, Dialect, Kind};
-use crate::header::{self, HeadLine, Header};
+use crate::encoding::{self, Encoding};
+use crate::error::TextError;
+use crate::header::{self, HeadLine, Header, column_name};
 use crate::line::{Lines, after_end, field_end, fields, is_blank, is_end, uncommented, unquoted};
-use crate::stamp::Order;
-use crate::{Delimiter, Encoding, TextError, encoding, error, number, stamp};
+use crate::number;
+use crate::stamp::{self, Order};
 
 /// What stands in [`Values::Stamps`] for an empty cell.
 pub const MISSING_STAMP: i64 = i64::MIN;
@@ -282,7 +285,7 @@ impl Rows {
                 let field = text[at..end].trim_ascii();
                 empty &= field.is_empty();
                 sink.take(field, n_rows, point, order).map_err(|wrong| {
-                    let (column, found) = (column_name(names, column), error::shown(field));
+                    let (column, found) = (column_name(names, column), encoding::shown(field));
                     match wrong {
                         Wrong::NotANumber => TextError::NotANumber { line, column, found },
                         Wrong::NotATime => TextError::NotATime { line, column, found },
@@ -369,13 +372,6 @@ fn is_remark_name(name: &str) -> bool {
 /// A line that is one quoted text where a row has several fields.
 fn is_remark(line: &[u8], delimiter: Delimiter, n_required: usize) -> bool {
     line.trim_ascii_start().starts_with(b"\"") && n_required > 1 && fields(line, delimiter).len() == 1
-}
-
-pub(crate) fn column_name(names: &[String], column: usize) -> String {
-    match names.get(column) {
-        Some(name) if !name.is_empty() => error::short(name),
-        _ => format!("column {column}"),
-    }
 }
 
 fn line_end(text: &[u8], at: usize) -> usize {

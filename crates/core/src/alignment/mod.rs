@@ -12,6 +12,7 @@
 //! interpolation leaves of the target's noise. In time where all bins are kept, over the kept bins otherwise.
 
 mod grid;
+mod precision;
 mod products;
 mod weighting;
 
@@ -23,19 +24,19 @@ use pulp::{Arch, Simd, WithSimd};
 use crate::alignment::grid::Grid;
 use crate::alignment::products::{Cross, Multiply, Products};
 use crate::alignment::weighting::{Energies, Weighting};
-use crate::bad_samples::{About, BadSamples, Examination};
+use crate::bad_samples::{About, Examination};
 use crate::causal::CausalDecimator;
 use crate::error::Result;
 use crate::floor;
 use crate::lag::{MAX_PEAKS, MAX_STEP, Peak, Peaks, Search, SearchState, View};
 use crate::lagrange::{AFTER, BEFORE, NODES, Taps};
-use crate::noise::{
-    Autoregression, Changes, Influence, MAX_ORDER, NoisyTarget, Precision, Sampling, Spread, SpreadState, cell_width,
-};
+use crate::noise::{MAX_ORDER, SpreadState, cell_width};
 use crate::reason::Reason;
+use crate::settings::{Estimator, EvaluatorConfig, Noise};
 use crate::spectrum::{Scratch, SpectrumConfig};
 use crate::sums;
-use crate::tracking::{Estimator, EvaluatorConfig, Noise, Tracking, centroid, weigh};
+use crate::tracking::Tracking;
+use crate::weigh::weigh;
 use crate::window::{Detrend, Window};
 
 /// Newton's steps at most.
@@ -48,8 +49,6 @@ const SETTLED: f64 = 1e-7;
 const LAST_SECANT_STEP: f64 = 2e-3;
 /// Fewest samples that are judged.
 const MIN_SUPPORT: usize = 16;
-/// Least share of measured that must follow the target.
-const MIN_GOODNESS: f64 = 0.1;
 /// Two delays fit equally well if the likelihood of one is below exp(10) times that of the other.
 const LOG_ODDS: f64 = 10.0;
 /// Up to this frequency, and the next power of two of it in the rate, precision is looked at where that is enough;
@@ -186,9 +185,7 @@ pub(crate) struct AlignmentState {
     measured_noise: f64,
     /// The same of the target where it is taken for exact, too.
     target_floor: f64,
-    /// Stretches of the support that are left out, and how many samples they are.
-    lost: Vec<Range<usize>>,
-    n_lost: usize,
+    support: Support,
     /// Target and measured, decimated, and the buffers of each level.
     decimated: [Vec<f64>; 2],
     gaps: [Vec<Range<usize>>; 2],
@@ -198,18 +195,69 @@ pub(crate) struct AlignmentState {
 impl AlignmentState {
     /// Room for the gaps of views of `n` samples.
     pub(crate) fn reserve(&mut self, n: usize) {
-        self.lost.reserve(n + 1);
+        self.support.lost.reserve(n + 1);
         self.gaps.iter_mut().for_each(|gaps| gaps.reserve(n / 2 + 1));
         self.levels.iter_mut().for_each(|level| level.reserve(n));
     }
+}
 
-    /// Where the judged samples of `support` stand in the signals, one after the other.
-    fn within(&self, start: usize, support: &Range<usize>) -> Range<usize> {
-        support.start - start..support.end - start - self.n_lost
+/// A window to be judged, in the record around it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Judged<'a> {
+    view: View<'a>,
+    /// Index in the record of its first sample.
+    start: usize,
+    /// Of delays that fit equally well the nearest to this is taken, in samples; without it the answer is "ambiguous".
+    expected: Option<f64>,
+    /// By sums over the kept bins, not over samples.
+    in_bins: bool,
+}
+
+impl<'a> Judged<'a> {
+    /// The window that starts at sample `start` of the record; the samples are finite.
+    pub(crate) fn new(view: View<'a>, start: usize, expected: Option<f64>) -> Self {
+        Self { view, start, expected, in_bins: false }
     }
 
-    /// Finds which samples of `support` are bad, or are compared at delays from `least` to `most` with bad ones of the target.
-    fn lose(&mut self, gaps: [&[Range<usize>]; 2], support: &Range<usize>, least: f64, most: f64) {
+    /// The same by sums over the kept bins.
+    fn in_bins(&self) -> Self {
+        Self { in_bins: true, ..*self }
+    }
+}
+
+/// The samples of a window that are compared: those for which the target is known at all delays that are looked at, less the bad
+/// ones.
+#[derive(Debug, Clone, Default)]
+struct Support {
+    /// From the first to the last, by their index in the record.
+    range: Range<usize>,
+    /// Stretches of it that are left out, and how many samples they are.
+    lost: Vec<Range<usize>>,
+    n_lost: usize,
+    /// Where the others stand in the signals, one after the other.
+    within: Range<usize>,
+}
+
+impl Support {
+    /// The samples of `range`, of the window that starts at `start`, at delays from `least` to `most`.
+    fn settle(&mut self, range: Range<usize>, judged: &Judged<'_>, [least, most]: [f64; 2]) {
+        self.range = range;
+        self.lost.clear();
+        self.n_lost = 0;
+        if judged.view.has_gaps() {
+            self.lose(judged.view.gaps, least, most);
+            if 2 * self.n_lost > self.range.len() {
+                // Between turns far apart the bridges of target's gaps must do.
+                let middle = 0.5 * (least + most);
+                self.lose(judged.view.gaps, middle, middle);
+            }
+        }
+        self.within = self.range.start - judged.start..self.range.end - judged.start - self.n_lost;
+    }
+
+    /// Finds which samples are bad, or are compared at delays from `least` to `most` with bad ones of the target.
+    fn lose(&mut self, gaps: [&[Range<usize>]; 2], least: f64, most: f64) {
+        let support = self.range.clone();
         let (before, after) = (AFTER as f64 + 1.0 - least.floor(), BEFORE as f64 + 1.0 + most.ceil());
         let [mut target, mut measured] = gaps.map(|gaps| gaps.iter().peekable());
         let middle = (0.5 * (least + most)).round();
@@ -244,18 +292,18 @@ impl AlignmentState {
         }
         self.n_lost = self.lost.iter().map(Range::len).sum();
     }
-}
 
-/// What is left of `n` samples without the lost ones, and where it goes when it is put together.
-fn kept(lost: &[Range<usize>], n: usize) -> impl Iterator<Item = (Range<usize>, usize)> + '_ {
-    let ends = lost.iter().map(|gap| gap.end);
-    let starts = lost.iter().map(|gap| gap.start).chain([n]);
-    let mut at = 0;
-    std::iter::once(0).chain(ends).zip(starts).map(move |(from, to)| {
-        let here = at;
-        at += to - from;
-        (from..to, here)
-    })
+    /// What is left without the lost ones, from the first on, and where it stands in the signals.
+    fn kept(&self) -> impl Iterator<Item = (Range<usize>, Range<usize>)> + '_ {
+        let ends = self.lost.iter().map(|gap| gap.end);
+        let starts = self.lost.iter().map(|gap| gap.start).chain([self.range.len()]);
+        let mut at = self.within.start;
+        std::iter::once(0).chain(ends).zip(starts).map(move |(from, to)| {
+            let here = at;
+            at += to - from;
+            (from..to, here..at)
+        })
+    }
 }
 
 /// n samples each, zero outside the judged ones.
@@ -450,8 +498,7 @@ impl Alignment {
             },
             target_noise: 0.0,
             target_floor: 0.0,
-            lost: Vec::new(),
-            n_lost: 0,
+            support: Support::default(),
             measured_noise: 0.0,
             decimated: std::array::from_fn(|_| {
                 vec![0.0; self.levels.iter().map(|l| l.alignment.longest_view()).max().unwrap_or(0)]
@@ -461,71 +508,56 @@ impl Alignment {
         }
     }
 
-    /// Gain and delay over the window that starts at sample `start` of the record; the samples are finite. Of delays that fit
-    /// equally well the one nearest to `expected` (in samples) is taken; without it the answer is "ambiguous".
-    pub(crate) fn estimate(
-        &self,
-        state: &mut AlignmentState,
-        view: &View<'_>,
-        start: usize,
-        expected: Option<f64>,
-    ) -> Tracking {
-        match self.determine(state, view, start, expected) {
+    /// Gain and delay over a window.
+    pub(crate) fn estimate(&self, state: &mut AlignmentState, judged: &Judged<'_>) -> Tracking {
+        match self.determine(state, judged) {
             Ok(tracking) => tracking,
             Err(reason) => Tracking::undetermined(reason),
         }
     }
 
-    /// The same without the samples of `view` that are bad, which are looked for.
+    /// The same without the samples around that are bad, which are looked for.
     pub(crate) fn estimate_examined(
         &self,
         state: &mut AlignmentState,
         examination: &mut Examination,
-        view: &View<'_>,
-        start: usize,
-        expected: Option<f64>,
+        judged: &Judged<'_>,
     ) -> Tracking {
         let about = |signals: [&[f64]; 2]| {
             let [target, measured] = signals;
-            About::find(&self.search, &mut state.search, &View { target, measured, ..*view }, start)
+            About::find(&self.search, &mut state.search, &View { target, measured, ..judged.view }, judged.start)
         };
-        if !examination.examine([view.target, view.measured], about) {
-            return self.estimate(state, view, start, expected);
+        if !examination.examine([judged.view.target, judged.view.measured], about) {
+            return self.estimate(state, judged);
         }
         let share = examination.share();
         let tracking = if share > MOST_BAD {
             Tracking::undetermined(Reason::BadSamples { share })
         } else {
-            self.estimate(state, &examination.view(), start, expected)
+            self.estimate(state, &Judged { view: examination.view(), ..*judged })
         };
         Tracking { bad_samples: examination.found(), ..tracking }
     }
 
     /// As the target is exact, or as its own noise demands.
-    fn determine(
-        &self,
-        state: &mut AlignmentState,
-        view: &View<'_>,
-        start: usize,
-        expected: Option<f64>,
-    ) -> std::result::Result<Tracking, Reason> {
+    fn determine(&self, state: &mut AlignmentState, judged: &Judged<'_>) -> std::result::Result<Tracking, Reason> {
         state.target_noise = 0.0;
-        let own = start - view.origin..start + self.n_samples - view.origin;
-        let (target, measured) = (&view.target[own.clone()], &view.measured[own]);
+        let own = self.own(judged);
+        let (target, measured) = (&judged.view.target[own.clone()], &judged.view.measured[own]);
         state.target_floor = floor::variance(target, 1) / floor::of_correlated(&self.correlation);
         if self.noise_ratio > 0.0 || self.noise == Noise::Coloured {
-            return self.judge(state, view, start, expected);
+            return self.judge(state, judged);
         }
         let motion = Motion::of(target, state.target_floor);
         let high = motion.noise / motion.variance;
         if !(high > FAST_SHARE || motion.is_noisy()) {
-            return self.judge(state, view, start, expected);
+            return self.judge(state, judged);
         }
         state.measured_noise = floor::variance(measured, 1) / floor::of_correlated(&self.correlation);
-        let noisy = self.judge_noisy(state, view, start, expected, &motion);
+        let noisy = self.judge_noisy(state, judged, &motion);
         state.target_noise = 0.0;
         // Where noise leaves no number, what the target would give were it exact tells where to look.
-        let Ok(about) = noisy.or_else(|_| self.judge(state, view, start, expected)) else { return noisy };
+        let Ok(about) = noisy.or_else(|_| self.judge(state, judged)) else { return noisy };
         let lag = about.delay_s * self.rate_hz;
         if floor::is_common(target, measured, lag, about.amplitude) {
             let found = noisy.unwrap_or(about);
@@ -538,11 +570,8 @@ impl Alignment {
         // The highest frequencies are motion, as measured follows them; only what it does not follow is noise.
         let motion = Motion { noise: motion.noise * (1.0 - followed), ..motion };
         state.target_floor = motion.noise;
-        let found = if motion.is_noisy() {
-            self.judge_noisy(state, view, start, expected, &motion)?
-        } else {
-            self.judge(state, view, start, expected)?
-        };
+        let found =
+            if motion.is_noisy() { self.judge_noisy(state, judged, &motion)? } else { self.judge(state, judged)? };
         let share = high * followed;
         // What is misread between samples follows the target as well; more than that has another cause.
         let without_cause = match found.reason {
@@ -562,23 +591,21 @@ impl Alignment {
     fn judge_noisy(
         &self,
         state: &mut AlignmentState,
-        view: &View<'_>,
-        start: usize,
-        expected: Option<f64>,
+        judged: &Judged<'_>,
         motion: &Motion,
     ) -> std::result::Result<Tracking, Reason> {
-        let own = &view.target[start - view.origin..start + self.n_samples - view.origin];
+        let own = &judged.view.target[self.own(judged)];
         let most = self.levels.last().map_or(1, |l| l.decimator.factor());
         let slowest = motion.slowest(own, most);
         let level = self.levels.iter().rposition(|l| l.decimator.factor() <= slowest);
         let mut found = match level {
-            Some(level) => self.judge_lower(state, view, start, expected, motion.noise, level),
+            Some(level) => self.judge_lower(state, judged, motion.noise, level),
             None => Err(Reason::TooShort { n_samples: 0 }),
         };
         // A lower rate's filter needs samples at both ends.
         if matches!(found, Err(Reason::TooShort { .. } | Reason::BadSamples { .. })) {
             state.target_noise = motion.noise;
-            found = self.judge(state, view, start, expected);
+            found = self.judge(state, judged);
         }
         found.map(|tracking| Tracking { target_noise: motion.noise.sqrt(), ..tracking })
     }
@@ -587,12 +614,11 @@ impl Alignment {
     fn judge_lower(
         &self,
         state: &mut AlignmentState,
-        view: &View<'_>,
-        start: usize,
-        expected: Option<f64>,
+        judged: &Judged<'_>,
         noise: f64,
         level: usize,
     ) -> std::result::Result<Tracking, Reason> {
+        let Judged { view, start, expected, .. } = *judged;
         let Level { decimator, variance, alignment } = &self.levels[level];
         let (factor, delay) = (decimator.factor(), decimator.delay());
         // Of the samples at start + k factor, k from -margin on, those for which the filter is full.
@@ -630,37 +656,34 @@ impl Alignment {
         lower.measured_noise = measured_noise;
         lower.target_noise = noise * variance;
         lower.target_floor = lower.target_noise;
-        let found = alignment.judge(lower, &view, margin as usize, expected.map(|d| d / factor as f64));
+        let judged = Judged::new(view, margin as usize, expected.map(|d| d / factor as f64));
+        let found = alignment.judge(lower, &judged);
         state.decimated = [target, measured];
         state.gaps = gaps;
         found
     }
 
     /// Gain and delay with their precision; the state says how noisy the target is.
-    fn judge(
-        &self,
-        state: &mut AlignmentState,
-        view: &View<'_>,
-        start: usize,
-        expected: Option<f64>,
-    ) -> std::result::Result<Tracking, Reason> {
-        let peaks = self.search.peaks(&mut state.search, view, start, expected)?;
-        let limit = self.limit(&peaks);
+    fn judge(&self, state: &mut AlignmentState, judged: &Judged<'_>) -> std::result::Result<Tracking, Reason> {
+        let Judged { view, start, expected, .. } = *judged;
+        let peaks = self.search.peaks(&mut state.search, &view, start, expected)?;
         if self.noise_ratio > 0.0 {
-            self.weigh_bins(state, view, start, peaks.first().lag);
-            let (first, _) = self.best(state, view, start, &peaks, limit, expected, true)?;
+            let judged = judged.in_bins();
+            self.weigh_bins(state, &judged, peaks.first().lag);
+            let first = self.best(state, &judged, &peaks)?;
             // Once more at a delay that leaves nothing but noise.
-            self.weigh_bins(state, view, start, first.tau);
-            let (best, support) = self.around(state, view, start, first.tau, peaks.step, true)?;
-            return self.complete(state, view, start, &peaks, best, support);
+            self.weigh_bins(state, &judged, first.tau);
+            let best = self.around(state, &judged, first.tau, peaks.step)?;
+            return self.complete(state, &judged, &peaks, best);
         }
-        let mut found = self.best(state, view, start, &peaks, limit, expected, false);
+        let mut found = self.best(state, judged, &peaks);
         if found.is_err() && !self.in_time {
             // An offset that no bin holds may be all that the samples have in common.
-            found = self.best(state, view, start, &peaks, limit, expected, true);
+            found = self.best(state, &judged.in_bins(), &peaks);
         }
+        let limit = self.limit(&peaks);
         let at_the_end = peaks.first().lag.abs() + peaks.step as f64 > limit;
-        let (best, support) = match found {
+        let best = match found {
             Err(Reason::NoConvergence) if at_the_end => {
                 return Err(Reason::BeyondMaxDelay { max_delay_s: limit / self.rate_hz });
             }
@@ -668,8 +691,8 @@ impl Alignment {
         };
         if self.noise == Noise::Coloured {
             // Whitened by what the residual says of the noise, measured and target obey the same model.
-            let goodness = Some(self.leave_residual(state, &best, start, &support));
-            let noise = self.autoregression(state, start, &support);
+            let goodness = Some(self.leave_residual(state, &best));
+            let noise = self.autoregression(state);
             let p = noise.order;
             if p > 0 {
                 let margin = self.margin();
@@ -681,49 +704,47 @@ impl Alignment {
                 noise.whiten(&view.target[part.clone()], &mut first[..n]);
                 noise.whiten(&view.measured[part], &mut second[..n]);
                 let view = View { target: &first[..n], measured: &second[..n], origin: from + p, gaps: view.gaps };
-                let found =
-                    self.around(state, &view, start, best.tau, peaks.step, false).and_then(|(best, support)| {
-                        // Whitening leaves less of the motion than of the noise; that says nothing of the tracking.
-                        self.complete(state, &view, start, &peaks, Fit { goodness, ..best }, support)
-                    });
+                let judged = Judged { view, ..*judged };
+                let found = self.around(state, &judged, best.tau, peaks.step).and_then(|best| {
+                    // Whitening leaves less of the motion than of the noise; that says nothing of the tracking.
+                    self.complete(state, &judged, &peaks, Fit { goodness, ..best })
+                });
                 state.whitened = [first, second];
                 return found;
             }
-            self.place_measured(state, view, start, &support);
+            self.place_measured(state, judged);
         }
-        self.complete(state, view, start, &peaks, best, support)
+        self.complete(state, judged, &peaks, best)
     }
 
     /// From the least-squares delay over all frequencies to the estimator's own.
     fn complete(
         &self,
         state: &mut AlignmentState,
-        view: &View<'_>,
-        start: usize,
+        judged: &Judged<'_>,
         peaks: &Peaks,
         mut best: Fit,
-        mut support: Range<usize>,
     ) -> std::result::Result<Tracking, Reason> {
         if self.estimator == Estimator::Aligned {
-            let tracking = self.align(state, view, start, support, best)?;
+            let tracking = self.align(state, judged, best)?;
             self.check_delay(tracking.delay_s * self.rate_hz, peaks)?;
             return Ok(tracking);
         }
         if !self.in_time && self.noise_ratio == 0.0 {
             // Other frequencies may have another delay: a part of a period away at most.
             let room = (0.2 * self.n_samples as f64 / peaks.cycles).min(self.search.reach() as f64).max(2.0);
-            support = self.support(state, view, start, best.tau - room, best.tau + room);
-            let goodness = best.goodness;
-            self.check_support(state, &support)?;
-            self.place_answer(state, view, start, &support, true);
-            best = Fit { goodness, ..self.refine(state, view, start, &support, best.tau, room, true)? };
+            let (judged, goodness) = (judged.in_bins(), best.goodness);
+            self.find_support(state, &judged, [best.tau - room, best.tau + room]);
+            self.check_support(&state.support)?;
+            self.place_answer(state, &judged);
+            best = Fit { goodness, ..self.refine(state, &judged, best.tau, room)? };
         }
         if self.noise_ratio == 0.0 && best.noise_share > MOSTLY_NOISE {
             return Err(Reason::NoisyTarget { share: best.noise_share.min(1.0) });
         }
         self.check_delay(best.tau, peaks)?;
-        let tracking = self.finish(state, start, &support, &best, None);
-        let share = self.most_target_noise(state, start, &support, &best);
+        let tracking = self.finish(state, &best, None);
+        let share = self.most_target_noise(state, &best);
         Ok(if share > UNKNOWN_NOISE && tracking.reason.is_none() {
             tracking.without_interval(Reason::ColouredTargetNoise { share })
         } else {
@@ -733,13 +754,12 @@ impl Alignment {
 
     /// The share of the target's energy, or of its velocity's, that is noise if all is that the residual shows: asked where it
     /// shows more than both channels' highest frequencies do, so that the noise is coloured. Else 0.
-    fn most_target_noise(&self, state: &AlignmentState, start: usize, support: &Range<usize>, fit: &Fit) -> f64 {
+    fn most_target_noise(&self, state: &AlignmentState, fit: &Fit) -> f64 {
         if !(self.in_time && fit.noise > 0.0) {
             return 0.0;
         }
-        let within = state.within(start, support);
         let gain = fit.gain * fit.gain;
-        let white = (state.measured_noise + gain * state.target_noise) * self.window_moments(&within).0;
+        let white = (state.measured_noise + gain * state.target_noise) * self.window_moments(&state.support.within).0;
         if fit.residual > COLOURED * white {
             (fit.noise_share * fit.residual / (gain * fit.noise)).min(1.0)
         } else {
@@ -761,23 +781,21 @@ impl Alignment {
     }
 
     /// Learns, with the target shifted by `lag`, where its energy stands above its noise; what is below only adds noise.
-    fn weigh_bins(&self, state: &mut AlignmentState, view: &View<'_>, start: usize, lag: f64) {
-        let support = self.support(state, view, start, lag - 1.0, lag + 1.0);
+    fn weigh_bins(&self, state: &mut AlignmentState, judged: &Judged<'_>, lag: f64) {
+        self.find_support(state, judged, [lag - 1.0, lag + 1.0]);
         state.weighting.weights.fill(1.0);
         state.weighting.refresh(self.kept.correction.as_deref(), &self.kept.cosines);
-        if support.len() < MIN_SUPPORT {
+        if state.support.range.len() < MIN_SUPPORT {
             return;
         }
-        self.place_measured(state, view, start, &support);
-        self.place_target(state, view, start, &support, lag);
-        self.kept.spectrum.transform_one(&mut state.scratch, &state.signals.measured, None, &mut state.bins[MEASURED]);
+        self.place_answer(state, judged);
+        self.place_target(state, judged, lag);
         let products = self.products_in_bins(state);
         let ratio = TargetNoise::Ratio(&state.weighting.correlation, self.noise_ratio);
         let Some(score) = score(&products, lag, &ratio) else {
             return;
         };
-        let within = state.within(start, &support);
-        let (window_power, fourths) = self.window_moments(&within);
+        let (window_power, fourths) = self.window_moments(&state.support.within);
         let bins_per_piece = self.bins_per_piece(window_power, fourths);
         let AlignmentState { bins: [y, _, o], weighting, .. } = state;
         let mut energies = Energies {
@@ -809,17 +827,8 @@ impl Alignment {
     }
 
     /// The best of the peaks, whose signals stand in the state afterwards; none where a turn out of reach fits far better.
-    fn best(
-        &self,
-        state: &mut AlignmentState,
-        view: &View<'_>,
-        start: usize,
-        found: &Peaks,
-        limit: f64,
-        expected: Option<f64>,
-        in_bins: bool,
-    ) -> std::result::Result<(Fit, Range<usize>), Reason> {
-        let (fit, support) = self.best_within(state, view, start, found, limit, expected, in_bins)?;
+    fn best(&self, state: &mut AlignmentState, judged: &Judged<'_>, found: &Peaks) -> std::result::Result<Fit, Reason> {
+        let (fit, limit) = (self.best_within(state, judged, found)?, self.limit(found));
         let spacing = |p: &Peak| (p.lag - fit.tau).abs();
         let others = found.peaks().iter().map(spacing).filter(|distance| *distance > room(found.step));
         let period = match others.min_by(f64::total_cmp) {
@@ -827,7 +836,7 @@ impl Alignment {
             None if found.is_narrow() && fit.residual > LEFT_BY_A_TURN * fit.products.oo => {
                 self.n_samples as f64 / found.cycles
             }
-            None => return Ok((fit, support)),
+            None => return Ok(fit),
         };
         let turns = [fit.tau - period, fit.tau + period];
         let mut moved = false;
@@ -835,49 +844,45 @@ impl Alignment {
             moved = true;
             let room = room(found.step).max(0.2 * period);
             let (least, most) = (fit.tau.min(turn) - room - LOOKS, fit.tau.max(turn) + room + LOOKS);
-            let support = self.support(state, view, start, least, most);
-            if self.check_support(state, &support).is_err() {
+            self.find_support(state, judged, [least, most]);
+            if self.check_support(&state.support).is_err() {
                 continue;
             }
-            self.place_answer(state, view, start, &support, in_bins);
-            let Ok(here) = self.refine(state, view, start, &support, fit.tau, room, in_bins) else { continue };
-            let Ok(there) = self.refine(state, view, start, &support, turn, room, in_bins) else { continue };
-            self.place_residual(state, view, start, &support, &there);
-            let freedom = independent(&state.signals.measured[state.within(start, &support)]);
+            self.place_answer(state, judged);
+            let Ok(here) = self.refine(state, judged, fit.tau, room) else { continue };
+            let Ok(there) = self.refine(state, judged, turn, room) else { continue };
+            self.place_residual(state, judged, &there);
+            let freedom = independent(&state.signals.measured[state.support.within.clone()]);
             let floor = EXACT * here.products.oo;
             if 0.5 * freedom * (here.residual.max(floor) / there.residual.max(floor)).ln() > LOG_ODDS {
                 return Err(Reason::BeyondMaxDelay { max_delay_s: limit / self.rate_hz });
             }
         }
-        if moved { self.around(state, view, start, fit.tau, found.step, in_bins) } else { Ok((fit, support)) }
+        if moved { self.around(state, judged, fit.tau, found.step) } else { Ok(fit) }
     }
 
     /// Refines the peaks and takes the best, whose signals stand in the state afterwards.
     fn best_within(
         &self,
         state: &mut AlignmentState,
-        view: &View<'_>,
-        start: usize,
+        judged: &Judged<'_>,
         found: &Peaks,
-        limit: f64,
-        expected: Option<f64>,
-        in_bins: bool,
-    ) -> std::result::Result<(Fit, Range<usize>), Reason> {
-        let (peaks, step) = (found.peaks(), found.step);
+    ) -> std::result::Result<Fit, Reason> {
+        let (peaks, step, limit, expected) = (found.peaks(), found.step, self.limit(found), judged.expected);
         let distance = |lag: f64| expected.map_or(0.0, |expected| (lag - expected).abs());
         // One peak, or the highest is nearest to the expected delay: nothing to choose between.
         let is_nearest = expected.is_some() && peaks.iter().all(|p| distance(p.lag) >= distance(found.first().lag));
         if peaks.len() == 1 || is_nearest {
-            return self.around(state, view, start, found.first().lag, step, in_bins);
+            return self.around(state, judged, found.first().lag, step);
         }
         let room = room(step);
         let lags = || peaks.iter().map(|p| p.lag);
         let (least, most) = (lags().fold(f64::INFINITY, f64::min), lags().fold(f64::NEG_INFINITY, f64::max));
         // All are judged on the same samples.
-        let support = self.placed_around(state, view, start, [least, most], step, in_bins)?;
+        self.place_around(state, judged, [least, most], step)?;
         let mut turns = Turns::default();
         for (i, peak) in peaks.iter().enumerate() {
-            let fit = self.refine(state, view, start, &support, peak.lag, room, in_bins);
+            let fit = self.refine(state, judged, peak.lag, room);
             let fit = fit.ok().filter(|f| f.tau.abs() <= limit * (1.0 + 1e-9));
             // Two peaks may lead to one place.
             turns.fits[i] = fit.filter(|f| !turns.within().any(|other| (other.tau - f.tau).abs() <= 1.0));
@@ -885,7 +890,7 @@ impl Alignment {
         let Some(best) = turns.within().copied().min_by(|a, b| a.residual.total_cmp(&b.residual)) else {
             return Err(Reason::NoConvergence);
         };
-        let mut chosen = self.keep_equal(state, view, start, &support, &mut turns, best, in_bins);
+        let mut chosen = self.keep_equal(state, judged, &mut turns, best);
         if expected.is_some() {
             let nearer = |c: Fit, f: &Fit| if distance(f.tau) < distance(c.tau) { *f } else { c };
             chosen = turns.within().fold(chosen, nearer);
@@ -893,56 +898,49 @@ impl Alignment {
             let [delay_s, other_s] = neighbours.map(|tau| tau / self.rate_hz);
             return Err(Reason::Ambiguous { delay_s, other_s });
         }
-        self.around(state, view, start, chosen.tau, step, in_bins)
+        self.around(state, judged, chosen.tau, step)
     }
 
     /// The fit nearest to `lag`, whose signals stand in the state afterwards.
     fn around(
         &self,
         state: &mut AlignmentState,
-        view: &View<'_>,
-        start: usize,
+        judged: &Judged<'_>,
         lag: f64,
         step: usize,
-        in_bins: bool,
-    ) -> std::result::Result<(Fit, Range<usize>), Reason> {
-        let found = self.around_once(state, view, start, lag, step, in_bins)?;
-        if !view.has_gaps() {
+    ) -> std::result::Result<Fit, Reason> {
+        let found = self.around_once(state, judged, lag, step)?;
+        if !judged.view.has_gaps() {
             return Ok(found);
         }
         // Near the delay fewer samples are compared with gaps of target.
-        self.around_once(state, view, start, found.0.tau, 0, in_bins)
+        self.around_once(state, judged, found.tau, 0)
     }
 
     fn around_once(
         &self,
         state: &mut AlignmentState,
-        view: &View<'_>,
-        start: usize,
+        judged: &Judged<'_>,
         lag: f64,
         step: usize,
-        in_bins: bool,
-    ) -> std::result::Result<(Fit, Range<usize>), Reason> {
-        let support = self.placed_around(state, view, start, [lag, lag], step, in_bins)?;
-        let fit = self.refine(state, view, start, &support, lag, room(step), in_bins)?;
-        Ok((fit, support))
+    ) -> std::result::Result<Fit, Reason> {
+        self.place_around(state, judged, [lag, lag], step)?;
+        self.refine(state, judged, lag, room(step))
     }
 
-    /// The support of a search from `least` to `most`, on which measured is placed.
-    fn placed_around(
+    /// Places measured on the support of a search from `least` to `most`.
+    fn place_around(
         &self,
         state: &mut AlignmentState,
-        view: &View<'_>,
-        start: usize,
+        judged: &Judged<'_>,
         [least, most]: [f64; 2],
         step: usize,
-        in_bins: bool,
-    ) -> std::result::Result<Range<usize>, Reason> {
+    ) -> std::result::Result<(), Reason> {
         let room = room(step) + LOOKS;
-        let support = self.support(state, view, start, least - room, most + room);
-        self.check_support(state, &support)?;
-        self.place_answer(state, view, start, &support, in_bins);
-        Ok(support)
+        self.find_support(state, judged, [least - room, most + room]);
+        self.check_support(&state.support)?;
+        self.place_answer(state, judged);
+        Ok(())
     }
 
     /// Keeps of `turns` those that fit as well as the likeliest, which is returned: whose likelihood is not below its by
@@ -960,25 +958,16 @@ impl Alignment {
     ///
     /// Over bins, their number and the residual's correlation tell how many samples n are independent, and a noisy target gives
     /// V = 8 (sum e_best^2)^2 / n.
-    fn keep_equal(
-        &self,
-        state: &mut AlignmentState,
-        view: &View<'_>,
-        start: usize,
-        support: &Range<usize>,
-        turns: &mut Turns,
-        least: Fit,
-        in_bins: bool,
-    ) -> Fit {
-        let within = state.within(start, support);
+    fn keep_equal(&self, state: &mut AlignmentState, judged: &Judged<'_>, turns: &mut Turns, least: Fit) -> Fit {
+        let within = state.support.within.clone();
         let floor = EXACT * least.products.oo;
         let white = |freedom: f64, f: &Fit| 0.5 * freedom * (f.residual.max(floor) / least.residual.max(floor)).ln();
         let (weight, fourths) = self.window_moments(&within);
         let n = within.len();
         let of_target = least.gain * least.gain * state.target_floor * weight;
         let below = |excess: f64, variance: f64| 0.5 * excess * excess / variance < LOG_ODDS;
-        if in_bins && self.noise_ratio == 0.0 {
-            self.place_residual(state, view, start, support, &least);
+        if judged.in_bins && self.noise_ratio == 0.0 {
+            self.place_residual(state, judged, &least);
             let residual = &state.signals.measured[within];
             let noisy_target = of_target * n as f64 > sums::energy(residual);
             let of_bins = 2.0 * self.kept.spectrum.n_bins() as f64 / self.bins_per_piece(weight, fourths);
@@ -996,8 +985,8 @@ impl Alignment {
         let mut best = least;
         // What is least when every sample weighs alike need not be the likeliest in coloured noise.
         for _ in 0..MAX_REFERENCES {
-            self.place_residual(state, view, start, support, &best);
-            let noise = self.autoregression(state, start, support);
+            self.place_residual(state, judged, &best);
+            let noise = self.autoregression(state);
             whitened[..n].copy_from_slice(&state.signals.measured[within.clone()]);
             noise.whiten_in_place(&mut whitened[..n]);
             let all = sums::energy(&whitened[..n]).max(floor);
@@ -1007,7 +996,7 @@ impl Alignment {
                 if f.tau == best.tau {
                     return true;
                 }
-                self.place_residual(state, view, start, support, f);
+                self.place_residual(state, judged, f);
                 let other = &mut state.signals.measured[within.clone()];
                 noise.whiten_in_place(other);
                 let odds = Odds::of(other, &whitened[..n]);
@@ -1037,74 +1026,48 @@ impl Alignment {
     }
 
     /// What a fit leaves of measured, in measured's place.
-    fn place_residual(
-        &self,
-        state: &mut AlignmentState,
-        view: &View<'_>,
-        start: usize,
-        support: &Range<usize>,
-        fit: &Fit,
-    ) {
-        self.place_measured(state, view, start, support);
-        self.place_target(state, view, start, support, fit.tau);
-        self.leave_residual(state, &Fit { step: 0.0, ..*fit }, start, support);
+    fn place_residual(&self, state: &mut AlignmentState, judged: &Judged<'_>, fit: &Fit) {
+        self.place_measured(state, judged);
+        self.place_target(state, judged, fit.tau);
+        self.leave_residual(state, &Fit { step: 0.0, ..*fit });
+    }
+
+    /// The window's own samples in the view.
+    fn own(&self, judged: &Judged<'_>) -> Range<usize> {
+        let from = judged.start - judged.view.origin;
+        from..from + self.n_samples
     }
 
     /// The samples of the window for which the target is known at all delays from `least` to `most`, in samples.
-    fn known(&self, view: &View<'_>, start: usize, least: f64, most: f64) -> Range<usize> {
+    fn known(&self, judged: &Judged<'_>, [least, most]: [f64; 2]) -> Range<usize> {
         let before = (most.ceil() + (BEFORE + 1) as f64).max(0.0) as usize;
         let after = ((-least).ceil() + (AFTER + 1) as f64).max(0.0) as usize;
-        let from = start.max(view.origin + before);
-        let to = (start + self.n_samples).min(view.end().saturating_sub(after));
+        let from = judged.start.max(judged.view.origin + before);
+        let to = (judged.start + self.n_samples).min(judged.view.end().saturating_sub(after));
         from..to.max(from)
     }
 
-    /// The same less the bad ones, of which the state keeps account until it is asked for other delays.
-    fn support(
-        &self,
-        state: &mut AlignmentState,
-        view: &View<'_>,
-        start: usize,
-        least: f64,
-        most: f64,
-    ) -> Range<usize> {
-        let support = self.known(view, start, least, most);
-        state.lost.clear();
-        state.n_lost = 0;
-        if !view.has_gaps() {
-            return support;
-        }
-        state.lose(view.gaps, &support, least, most);
-        if 2 * state.n_lost > support.len() {
-            // Between turns far apart the bridges of target's gaps must do.
-            let middle = 0.5 * (least + most);
-            state.lose(view.gaps, &support, middle, middle);
-        }
-        support
+    /// The same less the bad ones become the support, until it is asked for other delays.
+    fn find_support(&self, state: &mut AlignmentState, judged: &Judged<'_>, delays: [f64; 2]) {
+        state.support.settle(self.known(judged, delays), judged, delays);
     }
 
-    fn check_support(&self, state: &AlignmentState, support: &Range<usize>) -> std::result::Result<(), Reason> {
-        if support.len() < MIN_SUPPORT || 2 * support.len() < self.n_samples {
-            return Err(Reason::TooShort { n_samples: support.len() });
+    fn check_support(&self, support: &Support) -> std::result::Result<(), Reason> {
+        let n = support.range.len();
+        if n < MIN_SUPPORT || 2 * n < self.n_samples {
+            return Err(Reason::TooShort { n_samples: n });
         }
-        let left = support.len() - state.n_lost;
-        if left < MIN_SUPPORT || 2 * left < support.len() {
-            return Err(Reason::BadSamples { share: state.n_lost as f64 / support.len() as f64 });
+        let left = n - support.n_lost;
+        if left < MIN_SUPPORT || 2 * left < n {
+            return Err(Reason::BadSamples { share: support.n_lost as f64 / n as f64 });
         }
         Ok(())
     }
 
     /// Places measured, and transforms it where sums over bins are asked for.
-    fn place_answer(
-        &self,
-        state: &mut AlignmentState,
-        view: &View<'_>,
-        start: usize,
-        support: &Range<usize>,
-        in_bins: bool,
-    ) {
-        self.place_measured(state, view, start, support);
-        if in_bins {
+    fn place_answer(&self, state: &mut AlignmentState, judged: &Judged<'_>) {
+        self.place_measured(state, judged);
+        if judged.in_bins {
             let AlignmentState { signals, bins, scratch, .. } = state;
             self.kept.spectrum.transform_one(scratch, &signals.measured, None, &mut bins[MEASURED]);
         }
@@ -1115,25 +1078,24 @@ impl Alignment {
     fn refine(
         &self,
         state: &mut AlignmentState,
-        view: &View<'_>,
-        start: usize,
-        support: &Range<usize>,
+        judged: &Judged<'_>,
         tau: f64,
         room: f64,
-        in_bins: bool,
     ) -> std::result::Result<Fit, Reason> {
         let (low, high) = (tau - room, tau + room);
-        let within = state.within(start, support);
-        let known = if state.target_noise > 0.0 { state.target_noise * self.window_moments(&within).0 } else { 0.0 };
+        let known = if state.target_noise > 0.0 {
+            state.target_noise * self.window_moments(&state.support.within).0
+        } else {
+            0.0
+        };
         // Where the score is known to be positive (the delay is larger) and negative.
         let (mut below, mut above) = (low, high);
         let mut now = tau;
         let mut last: Option<(f64, f64)> = None;
         for _ in 0..MAX_STEPS {
-            self.place_target(state, view, start, support, now);
-            let products =
-                if in_bins { self.products_in_bins(state) } else { self.products_in_time(state, start, support) };
-            let noise = match (in_bins, known > 0.0) {
+            self.place_target(state, judged, now);
+            let products = if judged.in_bins { self.products_in_bins(state) } else { self.products_in_time(state) };
+            let noise = match (judged.in_bins, known > 0.0) {
                 _ if self.noise_ratio > 0.0 => TargetNoise::Ratio(&state.weighting.correlation, self.noise_ratio),
                 (_, false) => TargetNoise::None,
                 (false, true) => TargetNoise::Known(&self.correlation, known),
@@ -1190,50 +1152,39 @@ impl Alignment {
     }
 
     /// Measured over the judged samples, detrended and windowed.
-    fn place_measured(&self, state: &mut AlignmentState, view: &View<'_>, start: usize, support: &Range<usize>) {
-        let within = state.within(start, support);
-        let AlignmentState { signals: Signals { measured, .. }, lost, .. } = state;
-        clear_around(measured, &within);
-        let from = support.start - view.origin;
-        for (kept, at) in kept(lost, support.len()) {
-            let to = within.start + at;
-            measured[to..to + kept.len()].copy_from_slice(&view.measured[from + kept.start..from + kept.end]);
+    fn place_measured(&self, state: &mut AlignmentState, judged: &Judged<'_>) {
+        let AlignmentState { signals: Signals { measured, .. }, support, .. } = state;
+        clear_around(measured, &support.within);
+        let from = support.range.start - judged.view.origin;
+        for (kept, to) in support.kept() {
+            measured[to].copy_from_slice(&judged.view.measured[from + kept.start..from + kept.end]);
         }
-        self.condition(measured, &within);
+        self.condition(measured, &support.within);
     }
 
     /// The target shifted by `tau` samples and its slope, treated as measured was.
-    fn place_target(
-        &self,
-        state: &mut AlignmentState,
-        view: &View<'_>,
-        start: usize,
-        support: &Range<usize>,
-        tau: f64,
-    ) {
+    fn place_target(&self, state: &mut AlignmentState, judged: &Judged<'_>, tau: f64) {
         let (whole, fraction) = fraction(tau);
-        let within = state.within(start, support);
-        let AlignmentState { signals: Signals { shifted, slope, .. }, lost, .. } = state;
-        let from = (support.start - view.origin + NODES).saturating_add_signed(whole) - NODES - BEFORE;
+        let AlignmentState { signals: Signals { shifted, slope, .. }, support, .. } = state;
+        let from = (support.range.start - judged.view.origin + NODES).saturating_add_signed(whole) - NODES - BEFORE;
         for signal in [&mut *shifted, &mut *slope] {
-            clear_around(signal, &within);
+            clear_around(signal, &support.within);
         }
         let taps = Taps::at(fraction);
-        for (kept, at) in kept(lost, support.len()) {
-            let to = within.start + at..within.start + at + kept.len();
+        for (kept, to) in support.kept() {
             self.arch.dispatch(Shift {
                 taps: &taps,
-                samples: &view.target[from + kept.start..from + kept.end + NODES - 1],
+                samples: &judged.view.target[from + kept.start..from + kept.end + NODES - 1],
                 value: &mut shifted[to.clone()],
                 slope: &mut slope[to],
             });
         }
-        self.condition(shifted, &within);
-        self.condition(slope, &within);
+        self.condition(shifted, &support.within);
+        self.condition(slope, &support.within);
     }
 
-    fn products_in_time(&self, state: &AlignmentState, start: usize, support: &Range<usize>) -> Products {
-        let within = state.within(start, support);
+    fn products_in_time(&self, state: &AlignmentState) -> Products {
+        let within = state.support.within.clone();
         let Signals { measured, shifted, slope } = &state.signals;
         self.arch.dispatch(Multiply {
             shifted: &shifted[within.clone()],
@@ -1272,25 +1223,6 @@ impl Alignment {
         }
     }
 
-    /// measured becomes measured less the fit; returns which share of it the fit explains, 1 - sum e^2 / sum (o - mean)^2.
-    fn leave_residual(&self, state: &mut AlignmentState, fit: &Fit, start: usize, support: &Range<usize>) -> f64 {
-        let within = state.within(start, support);
-        let Signals { measured, shifted, slope } = &mut state.signals;
-        let measured = &mut measured[within.clone()];
-        let total = sums::sum(measured);
-        let spread = sums::energy(measured) - total * total / measured.len() as f64;
-        let (gain, step) = (fit.gain, fit.step);
-        sums::subtract(measured, (gain, &shifted[within.clone()]), (-gain * step, &slope[within]));
-        if spread > 0.0 { 1.0 - sums::energy(measured) / spread } else { f64::NAN }
-    }
-
-    /// The autoregression of the residual that stands in measured's place.
-    fn autoregression(&self, state: &AlignmentState, start: usize, support: &Range<usize>) -> Autoregression {
-        let within = state.within(start, support);
-        let (squares, fourths) = self.window_moments(&within);
-        Autoregression::fit(&state.signals.measured[within], squares * squares / fourths)
-    }
-
     /// sum w^2 and sum w^4 over the judged samples.
     fn window_moments(&self, within: &Range<usize>) -> (f64, f64) {
         match &self.window {
@@ -1304,9 +1236,7 @@ impl Alignment {
     fn align(
         &self,
         state: &mut AlignmentState,
-        view: &View<'_>,
-        start: usize,
-        mut support: Range<usize>,
+        judged: &Judged<'_>,
         mut fit: Fit,
     ) -> std::result::Result<Tracking, Reason> {
         let from = fit.tau;
@@ -1320,15 +1250,13 @@ impl Alignment {
         self.kept.spectrum.transform_one(&mut state.scratch, &state.signals.measured, None, &mut state.bins[MEASURED]);
         for _ in 0..MAX_STEPS {
             let tau = fit.tau;
-            let known = self.known(view, start, tau, tau);
-            if support.start < known.start || known.end < support.end {
-                support = self.support(state, view, start, tau - 1.0, tau + 1.0);
-                self.check_support(state, &support)?;
-                self.place_measured(state, view, start, &support);
-                let AlignmentState { signals, bins, scratch, .. } = &mut *state;
-                self.kept.spectrum.transform_one(scratch, &signals.measured, None, &mut bins[MEASURED]);
+            let known = self.known(judged, [tau, tau]);
+            if state.support.range.start < known.start || known.end < state.support.range.end {
+                self.find_support(state, judged, [tau - 1.0, tau + 1.0]);
+                self.check_support(&state.support)?;
+                self.place_answer(state, &judged.in_bins());
             }
-            self.place_target(state, view, start, &support, tau);
+            self.place_target(state, judged, tau);
             let AlignmentState { signals, bins: [y, v, o], scratch, .. } = &mut *state;
             self.kept.spectrum.transform_one(scratch, &signals.shifted, None, y);
             let sums = |a: &[Complex<f64>], b: &[Complex<f64>]| {
@@ -1371,7 +1299,7 @@ impl Alignment {
             if step.abs() < last_step {
                 fit = Fit { tau: tau + step, step, gain: fei.norm() / clean * (1.0 + growth * step), ..fit };
                 let averaged = Averaged { equivalent_frequency_hz, power: found.power, slope, growth };
-                let mut tracking = self.finish(state, start, &support, &fit, Some(averaged));
+                let mut tracking = self.finish(state, &fit, Some(averaged));
                 if self.weight_power != 2 && tracking.reason.is_none() {
                     tracking = tracking.without_interval(Reason::WeightPower);
                 }
@@ -1381,213 +1309,6 @@ impl Alignment {
             fit.tau = tau + step;
         }
         Err(Reason::NoConvergence)
-    }
-
-    /// The result of a fit whose signals stand in the state, with its precision; `averaged` where it is a weighted average.
-    fn finish(
-        &self,
-        state: &mut AlignmentState,
-        start: usize,
-        support: &Range<usize>,
-        fit: &Fit,
-        averaged: Option<Averaged>,
-    ) -> Tracking {
-        let of_bins = (!self.in_time).then(|| self.goodness_in_bins(state, fit.gain));
-        let left = self.leave_residual(state, fit, start, support);
-        let goodness = fit.goodness.or(of_bins).unwrap_or(left);
-        if goodness.is_nan() || goodness < MIN_GOODNESS {
-            return Tracking::undetermined(Reason::LowCoherence { goodness });
-        }
-        let f_eq = match averaged {
-            Some(averaged) => averaged.equivalent_frequency_hz,
-            None => self.equivalent_frequency_hz(state),
-        };
-        let delay_s = fit.tau / self.rate_hz;
-        let phase_rad = 0.0 - 2.0 * std::f64::consts::PI * f_eq * delay_s;
-        let tracking = Tracking {
-            fei: Complex::from_polar(fit.gain, phase_rad),
-            amplitude: fit.gain,
-            phase_rad,
-            delay_s,
-            equivalent_frequency_hz: f_eq,
-            goodness,
-            reason: None,
-            ..Tracking::undetermined(Reason::Still)
-        };
-        let exact = 1.0 - left <= EXACT;
-        match self.precision(state, start, support, fit, averaged, exact) {
-            None => tracking.without_interval(Reason::FewBins),
-            Some(precision) => self.with_precision(tracking, &precision, exact),
-        }
-    }
-
-    /// The share of measured's energy at the kept bins that the fit explains; its transform still stands in the state.
-    fn goodness_in_bins(&self, state: &AlignmentState, gain: f64) -> f64 {
-        let [y, _, o] = &state.bins;
-        let correction = self.kept.correction.as_deref();
-        let mut cross = Cross { correction, first: self.kept.spectrum.first(), ..Cross::default() };
-        self.kept.spectrum.visit_pair([y, o], &mut cross);
-        let (yy, oy, oo) = cross.totals();
-        if oo > 0.0 { 1.0 - (oo - 2.0 * gain * oy + gain * gain * yy) / oo } else { f64::NAN }
-    }
-
-    /// Eq 7 of the shifted target that stands in the state.
-    fn equivalent_frequency_hz(&self, state: &mut AlignmentState) -> f64 {
-        let AlignmentState { signals, bins: [y, ..], scratch, weighting, .. } = state;
-        if self.in_time {
-            self.kept.spectrum.transform_one(scratch, &signals.shifted, None, y);
-        }
-        let (power, moment) = centroid(&self.kept.spectrum, self.factors(weighting), y);
-        moment / power * self.kept.spectrum.delta_f_hz()
-    }
-
-    /// How precise a fit is whose target and residual stand in the state.
-    fn precision(
-        &self,
-        state: &mut AlignmentState,
-        start: usize,
-        support: &Range<usize>,
-        fit: &Fit,
-        averaged: Option<Averaged>,
-        exact: bool,
-    ) -> Option<Precision> {
-        let within = state.within(start, support);
-        let (window_power, fourths) = self.window_moments(&within);
-        let AlignmentState {
-            signals: Signals { measured, shifted, slope }, bins, scratch, low, spread, weighting, ..
-        } = state;
-        let slow = |low: &Low| {
-            let share = 2.0 * (std::f64::consts::PI / (8 * low.grid.step) as f64).sin();
-            let velocity = &slope[within.clone()];
-            sums::step_energy(velocity) <= HIGH_SHARE * share * share * sums::energy(velocity)
-        };
-        let mut lowered = match (&self.low, low) {
-            (Some(plan), Some(state)) if plan.always || slow(plan) => Some((plan, state)),
-            _ => None,
-        };
-        let window = match &lowered {
-            Some((plan, _)) => plan.window.as_deref(),
-            None => self.window.as_deref(),
-        };
-        let (grid, scratch, judged, [e, y, v]) = match &mut lowered {
-            Some((plan, LowState { scratch, fewer })) => {
-                for (signal, fewer) in [&*measured, &*shifted, &*slope].into_iter().zip(&mut *fewer) {
-                    plan.grid.shorten(signal, fewer);
-                }
-                (&plan.grid, scratch, plan.grid.shortened(&within), fewer.each_mut().map(|a| a.as_mut_slice()))
-            }
-            None => (&self.kept, scratch, within.clone(), [&mut measured[..], &mut shifted[..], &mut slope[..]]),
-        };
-        let folded = grid.folded_len();
-        // Sums over samples are 2 / n times those over bins.
-        let to_bins = if self.in_time { 0.5 * folded } else { 1.0 };
-        let influence = match averaged {
-            // The parts of the noise in phase with the target and a quarter turn from it are independent.
-            Some(Averaged { power, slope, growth, .. }) => Influence {
-                gain: [(1.0 + (growth / slope).powi(2)).sqrt() / power, 0.0],
-                delay: [1.0 / (power * fit.gain * slope), 0.0],
-                leverage: [2.0 / power, 0.0, 0.0],
-            },
-            None => {
-                let Products { yy, yv, vv, .. } = fit.clean;
-                let determinant = (yy * vv - yv * yv) * to_bins;
-                Influence {
-                    gain: [vv / determinant, -yv / determinant],
-                    delay: [yv / determinant / fit.gain, -yy / determinant / fit.gain],
-                    leverage: [vv / determinant, -yv / determinant, yy / determinant],
-                }
-            }
-        };
-        let noise = Autoregression::fit(&e[judged.clone()], window_power * window_power / fourths / grid.step as f64);
-        let changes = if exact {
-            Changes::NONE
-        } else {
-            let window = window.map(|w| &w[judged.clone()]);
-            // Of sums over samples; the influence is that of sums over bins.
-            let scale = if self.in_time { (to_bins * grid.step as f64).powi(2) } else { 0.0 };
-            Changes::of(&noise, [&e[judged.clone()], &y[judged.clone()], &v[judged.clone()]], window, &influence, scale)
-        };
-        let spectrum = &grid.spectrum;
-        let [yk, vk, ek] = bins.each_mut().map(|b| &mut b[..spectrum.packed_len()]);
-        spectrum.transform_one(scratch, e, None, ek);
-        // The estimate is a sum over w (w y), so the noise is seen through the window twice; where the record is folded upon
-        // itself, what is summed is w y over noise of the mean of w^2.
-        let folded_up = folded < within.len() as f64;
-        // What the fit, or the equivalent frequency, has transformed already.
-        let of_kept = std::ptr::eq(grid, &self.kept);
-        let stand = [of_kept, of_kept && !self.in_time && averaged.is_none()];
-        for ((signal, bins), stands) in [(&mut *y, &mut *yk), (&mut *v, &mut *vk)].into_iter().zip(stand) {
-            let tapered = window.filter(|_| !folded_up);
-            if let Some(window) = tapered {
-                sums::multiply(signal, window);
-                // The mean, or line, that is taken from measured before the window lets through what is far from the target.
-                if let Some(line) = self.detrend.line(&signal[judged.clone()]) {
-                    line.subtract_from(&mut signal[judged.clone()]);
-                }
-            }
-            if !stands || tapered.is_some() {
-                spectrum.transform_one(scratch, signal, None, bins);
-            }
-        }
-        let sampling = Sampling {
-            window_power,
-            bins_per_piece: (folded * fourths / (window_power * window_power)).max(1.0),
-            scale: 0.5 * if folded_up { window_power } else { folded },
-        };
-        let noisy_target = if self.noise_ratio > 0.0 {
-            let share = fit.gain / (self.noise_ratio.powi(-2) + fit.gain * fit.gain);
-            Some(NoisyTarget { weights: Some(&weighting.weights), share })
-        } else {
-            let share = fit.gain * (fit.noise / fit.residual).min(1.0 / (fit.gain * fit.gain));
-            (fit.noise > 0.0).then_some(NoisyTarget { weights: None, share })
-        };
-        let correction = grid.correction.as_deref();
-        let first = spectrum.first();
-        let mut spread =
-            Spread::new(spread, first, &grid.cosines, correction, &noise, influence, sampling, noisy_target, changes);
-        spectrum.visit_pair([yk, vk], &mut spread);
-        spread.residual_next();
-        spectrum.visit_pair([yk, ek], &mut spread);
-        if self.in_time {
-            // At zero frequency there is no bin, but there may be much of the target.
-            let zero = |x: &[f64]| grid.step as f64 * sums::sum(x);
-            spread.zero_frequency(zero(y), zero(v), zero(e));
-        }
-        spread.precision(within.len())
-    }
-
-    fn with_precision(&self, mut tracking: Tracking, precision: &Precision, exact: bool) -> Tracking {
-        tracking.residual_coherence = precision.coherence;
-        if precision.coherent && !exact {
-            return tracking.without_interval(Reason::ResidualFollowsTarget { coherence: precision.coherence });
-        }
-        let Precision { gain_std, gain_reach, delay_std, delay_reach, .. } = *precision;
-        let (delay_std, delay_reach) = (delay_std / self.rate_hz, delay_reach / self.rate_hz);
-        if ![gain_std, gain_reach, delay_std, delay_reach].iter().all(|v| v.is_finite()) {
-            return tracking.without_interval(Reason::FewBins);
-        }
-        // Wider than half a turn says nothing of the delay.
-        if delay_reach * tracking.equivalent_frequency_hz >= 0.25 {
-            return Tracking::undetermined(Reason::Uncertain { reach_s: delay_reach });
-        }
-        tracking.amplitude_std = gain_std;
-        tracking.amplitude_interval = (tracking.amplitude - gain_reach, tracking.amplitude + gain_reach);
-        tracking.delay_std_s = delay_std;
-        tracking.delay_interval_s = (tracking.delay_s - delay_reach, tracking.delay_s + delay_reach);
-        tracking
-    }
-
-    /// The bad samples of a whole record; None where there are none, or they are kept.
-    pub(crate) fn examined(pair: &crate::Pair<'_>, config: &EvaluatorConfig) -> Option<Examination> {
-        let search = Search::new(pair.n_samples(), pair.rate_hz(), config.max_delay_s);
-        let view = View::whole(pair);
-        let mut examination = Examination::default();
-        let about = |signals: [&[f64]; 2]| {
-            let [target, measured] = signals;
-            About::find(&search, &mut search.state(), &View { target, measured, ..view }, 0)
-        };
-        (config.bad_samples == BadSamples::LeaveOut && examination.examine([view.target, view.measured], about))
-            .then_some(examination)
     }
 
     /// The delay of the whole record, in samples, as far as it can be told: of the only peak of the correlation, or of the one
@@ -1607,8 +1328,8 @@ impl Alignment {
         };
         let whole = Self::new(n, rate_hz, &config).ok()?;
         let mut state = whole.state();
-        let best = whole.best(&mut state, view, 0, &peaks, whole.limit(&peaks), None, false);
-        best.ok().map(|(fit, _)| fit.tau)
+        let best = whole.best(&mut state, &Judged::new(*view, 0, None), &peaks);
+        best.ok().map(|fit| fit.tau)
     }
 }
 

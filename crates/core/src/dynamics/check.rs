@@ -1,21 +1,8 @@
 //! Every mistake of a configuration at once, each with the key it is about.
 
-use std::fmt::{self, Display};
+use std::fmt::Display;
 
-/// One thing wrong with a configuration.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Mistake {
-    /// Where: `actuator[1].delay_s`, numbered from 1.
-    pub key: String,
-    /// What was expected and found.
-    pub message: String,
-}
-
-impl Display for Mistake {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.key, self.message)
-    }
-}
+use crate::error::{Error, Mistake};
 
 /// Gathers mistakes under a prefix of keys.
 #[derive(Debug, Default)]
@@ -59,4 +46,9 @@ pub(crate) fn positive(checks: &mut Checks, key: &str, found: f64) {
 pub(crate) fn nonnegative(checks: &mut Checks, key: &str, found: f64) {
     let sound = found == 0.0 || (LEAST..=MOST).contains(&found);
     checks.demand(key, sound, if found > 0.0 { RANGE } else { "a number of at least 0" }, found);
+}
+
+/// One mistake alone.
+pub(crate) fn configuration(key: &str, message: &str) -> Error {
+    Error::Configuration(vec![Mistake { key: key.into(), message: message.into() }])
 }

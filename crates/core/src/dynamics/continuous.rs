@@ -12,12 +12,16 @@
 
 use nalgebra::DMatrix;
 
-use super::actuator::{Delay, Dynamics, StateSpace, across, servo_rate};
+use super::actuator::Actuator;
+use super::check::configuration;
+use super::delay::Delay;
 use super::history::{Course, History, Motion, Tap};
 use super::law::Law;
-use super::structure::rows;
-use super::virtual_test::{Drive, Noise, Run, VirtualTest, across_add, add_across, configuration};
+use super::plant::{Dynamics, StateSpace};
+use super::structure::{across, across_add, add_across, multiply, rows};
+use super::virtual_test::{Drive, Noise, Run, VirtualTest};
 use crate::error::{Error, Result};
+use crate::pair::peak;
 
 /// omega h at which halving begins.
 const PACE: f64 = 0.5;
@@ -94,7 +98,7 @@ fn difference(one: &Run, two: &Run, alone: bool) -> f64 {
     let mut worst: f64 = 0.0;
     let moved = one.target.iter().zip(&two.target).chain(one.measured.iter().zip(&two.measured));
     for (a, b) in moved.chain(one.force.iter().zip(&two.force).filter(|_| alone)) {
-        let peak = crate::pair::peak(b);
+        let peak = peak(b);
         let change = a.iter().zip(b).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()));
         if peak > 0.0 {
             worst = worst.max(change / peak);
@@ -355,7 +359,7 @@ impl<'a> Equations<'a> {
             input.acceleration *= rig.pace * rig.pace;
             let (motion, answered) = if let Dynamics::ServoHydraulic(servo) = &actuator.dynamics {
                 let w = &y[rig.dynamics..rig.memory];
-                servo_rate(actuator, servo, w, input.displacement, &mut out[rig.dynamics..rig.memory]);
+                actuator.servo_rate(servo, w, input.displacement, &mut out[rig.dynamics..rig.memory]);
                 (w[3], w[2])
             } else {
                 let motion = match &rig.system {
@@ -379,7 +383,7 @@ impl<'a> Equations<'a> {
             (out[0], out[1]) = (v[0], self.inverse[0] * force[0]);
         } else if n > 0 {
             out[..n].copy_from_slice(v);
-            super::sampled::multiply(&self.inverse, force, &mut out[n..2 * n]);
+            multiply(&self.inverse, force, &mut out[n..2 * n]);
         }
         self.force = several;
     }
@@ -424,7 +428,7 @@ fn follow(system: &StateSpace, input: Motion, w: &[f64], out: &mut [f64]) -> Mot
 
 /// What an actuator spans of a vector over the degrees of freedom.
 #[inline(always)]
-fn place<const ONE: bool>(actuator: &super::Actuator, x: &[f64]) -> f64 {
+fn place<const ONE: bool>(actuator: &Actuator, x: &[f64]) -> f64 {
     if ONE { x[0] } else { actuator.across(x) }
 }
 

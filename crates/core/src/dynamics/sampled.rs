@@ -3,12 +3,14 @@
 
 use nalgebra::DMatrix;
 
-use super::actuator::{Actuator, SampledActuator, SampledActuatorState};
+use super::actuator::Actuator;
+use super::check::configuration;
 use super::compensator::CompensatorState;
 use super::history::Motion;
 use super::law::Memory;
-use super::structure::rows;
-use super::virtual_test::{Noise, Run, VirtualTest, across_add};
+use super::sampled_actuator::{SampledActuator, SampledActuatorState};
+use super::structure::{across_add, multiply, rows};
+use super::virtual_test::{Noise, Run, VirtualTest};
 use crate::error::{Error, Result};
 
 /// An explicit integrator: from the motion at one sample to displacement and velocity at the next, before any force there is known.
@@ -40,15 +42,6 @@ impl Explicit for Cr {
             x[i] += self.dt * (v[i] + change);
             v[i] += change;
         }
-    }
-}
-
-/// out = matrix * x, row by row.
-#[inline]
-pub(crate) fn multiply(matrix: &[f64], x: &[f64], out: &mut [f64]) {
-    let n = x.len();
-    for (row, out) in matrix.chunks_exact(n).zip(out.iter_mut()) {
-        *out = row.iter().zip(x).map(|(a, b)| a * b).sum();
     }
 }
 
@@ -138,7 +131,7 @@ pub(crate) fn run(test: &VirtualTest, ground: &[f64], noise: &Noise, bound: f64)
     let config = &test.config;
     let (n, rate) = (config.structure.n_dof(), config.rate_hz);
     let dt = 1.0 / rate;
-    let singular = || super::virtual_test::configuration("structure.mass_kg", "expected matrices that can be inverted");
+    let singular = || configuration("structure.mass_kg", "expected matrices that can be inverted");
     let integrator = Cr::new(test).ok_or_else(singular)?;
     let inverse = rows(&test.numerical.mass.clone().try_inverse().ok_or_else(singular)?);
     let (damping, stiffness) = (rows(&test.numerical.damping), rows(&test.numerical.stiffness));

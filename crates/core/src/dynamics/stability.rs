@@ -10,10 +10,11 @@ use std::f64::consts::PI;
 
 use nalgebra::{Cholesky, Complex, DMatrix, DVector};
 
-use super::actuator::{StateSpace, eigenvalues};
+use super::check::configuration;
 use super::law::Law;
+use super::plant::{StateSpace, eigenvalues};
 use super::structure::modes;
-use super::virtual_test::{VirtualTest, configuration};
+use super::virtual_test::VirtualTest;
 use crate::error::Result;
 
 /// How near to the imaginary axis an eigenvalue is taken for a crossing, before it is proved by |L| = 1.

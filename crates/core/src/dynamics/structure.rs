@@ -4,7 +4,8 @@ use std::f64::consts::PI;
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
-use super::check::{Checks, LEAST, MOST, Mistake, positive};
+use super::check::{Checks, LEAST, MOST, positive};
+use crate::error::Mistake;
 
 /// How far rounding may push an eigenvalue below zero, or a matrix from symmetry, relative to its largest entry.
 const ROUNDING: f64 = 1e-9;
@@ -211,6 +212,40 @@ impl Structure {
 /// Row by row; nalgebra keeps columns.
 pub(crate) fn rows(matrix: &DMatrix<f64>) -> Vec<f64> {
     matrix.transpose().as_slice().to_vec()
+}
+
+/// out = matrix * x, row by row.
+#[inline]
+pub(crate) fn multiply(matrix: &[f64], x: &[f64], out: &mut [f64]) {
+    let n = x.len();
+    for (row, out) in matrix.chunks_exact(n).zip(out.iter_mut()) {
+        *out = row.iter().zip(x).map(|(a, b)| a * b).sum();
+    }
+}
+
+/// x_dof - x_from of a vector over the degrees of freedom, numbered from 1; 0 is the ground.
+#[inline]
+pub(crate) fn across(dof: usize, from_dof: usize, x: &[f64]) -> f64 {
+    x[dof - 1] - if from_dof == 0 { 0.0 } else { x[from_dof - 1] }
+}
+
+/// A force between two degrees of freedom added to a vector over all of them.
+#[inline]
+pub(crate) fn across_add(x: &mut [f64], dof: usize, from_dof: usize, value: f64) {
+    x[dof - 1] += value;
+    if from_dof > 0 {
+        x[from_dof - 1] -= value;
+    }
+}
+
+/// matrix += value b b^T
+pub(crate) fn add_across(matrix: &mut DMatrix<f64>, dof: usize, from_dof: usize, value: f64) {
+    matrix[(dof - 1, dof - 1)] += value;
+    if from_dof > 0 {
+        matrix[(from_dof - 1, from_dof - 1)] += value;
+        matrix[(dof - 1, from_dof - 1)] -= value;
+        matrix[(from_dof - 1, dof - 1)] -= value;
+    }
 }
 
 /// The lowest eigenvalue of a symmetric matrix.

@@ -2,17 +2,12 @@
 
 use nalgebra::{Cholesky, DMatrix};
 
-use super::actuator::{Actuator, Delay, across};
-use super::check::{Checks, Mistake, positive};
+use super::actuator::Actuator;
+use super::check::{Checks, configuration, positive};
 use super::history::Motion;
 use super::law::Law;
-use super::stability::{CriticalDelay, DelayDamping, Loop};
-use super::structure::{Structure, lowest, modes};
-use super::{continuous, sampled};
+use super::structure::{Structure, across, add_across, lowest, modes};
 use crate::error::{Error, Result};
-
-/// Displacements beyond this many times the static one are out of bounds, where no bound is given.
-const BOUND: f64 = 1e3;
 /// How far rounding may push an eigenvalue of what is left of the structure below zero.
 const ROUNDING: f64 = 1e-9;
 
@@ -139,19 +134,9 @@ pub struct VirtualTest {
     pub(crate) numerical: Numerical,
     /// M i of the whole structure.
     pub(crate) load: Vec<f64>,
-    omega: Vec<f64>,
+    pub(super) omega: Vec<f64>,
     /// Undamped circular frequencies when all has yielded: what the bound is measured by.
-    softest: Vec<f64>,
-}
-
-/// matrix += value b b^T
-pub(crate) fn add_across(matrix: &mut DMatrix<f64>, dof: usize, from_dof: usize, value: f64) {
-    matrix[(dof - 1, dof - 1)] += value;
-    if from_dof > 0 {
-        matrix[(from_dof - 1, from_dof - 1)] += value;
-        matrix[(dof - 1, from_dof - 1)] -= value;
-        matrix[(from_dof - 1, dof - 1)] -= value;
-    }
+    pub(super) softest: Vec<f64>,
 }
 
 impl VirtualTest {
@@ -278,119 +263,9 @@ impl VirtualTest {
         with_elements(&self.config, &self.numerical)
     }
 
-    /// Runs the test under a ground acceleration, m/s^2, one value a sample, linear in between, after rest.
-    ///
-    /// # Errors
-    /// [`Error::NotFinite`] and [`Error::TooShort`] for the ground motion; [`Error::Configuration`] for a delay longer than
-    /// it, or for noise of another length; [`Error::Unstable`] with the time at which a displacement left its bound.
-    pub fn run(&self, ground: &[f64], noise: &Noise) -> Result<Run> {
-        if self.is_alone() {
-            return Err(configuration("structure", "expected one under a ground motion, found none"));
-        }
-        if ground.len() < 2 {
-            return Err(Error::TooShort { expected: 2, found: ground.len() });
-        }
-        crate::pair::check_finite(ground, crate::Signal::GroundMotion)?;
-        let duration = self.checked_duration(ground.len(), noise)?;
-        let bound = self.bound(ground, duration);
-        match self.config.stepping {
-            Stepping::Continuous => continuous::run(self, Drive::Ground(ground), noise, bound),
-            Stepping::Cr => sampled::run(self, ground, noise, bound),
-        }
-    }
-
-    /// Moves the actuators, which have no structure, along one target: its motion at every sample, after rest.
-    ///
-    /// `continuous` takes the polynomial of fifth degree through both samples in between. The first displacement should be
-    /// 0, from where the actuators begin.
-    ///
-    /// # Errors
-    /// As [`run`](Self::run), of the target.
-    pub fn follow(&self, target: &[Motion], noise: &Noise) -> Result<Run> {
-        if !self.is_alone() {
-            return Err(configuration("structure", "expected none where the target is given, found one"));
-        }
-        if target.len() < 2 {
-            return Err(Error::TooShort { expected: 2, found: target.len() });
-        }
-        let sound = |m: &Motion| [m.displacement, m.velocity, m.acceleration].iter().all(|v| v.is_finite());
-        if let Some(first) = target.iter().position(|m| !sound(m)) {
-            let count = target.iter().filter(|m| !sound(m)).count();
-            return Err(Error::NotFinite { signal: crate::Signal::Target, count, first });
-        }
-        self.checked_duration(target.len(), noise)?;
-        let peak = target.iter().fold(0.0, |peak: f64, m| peak.max(m.displacement.abs()));
-        let gain = self.config.actuators.iter().fold(1.0, |most: f64, a| most.max(a.gain.abs()));
-        let bound = self.config.bound_m.unwrap_or(if peak == 0.0 { BOUND } else { BOUND * gain * peak });
-        match self.config.stepping {
-            Stepping::Continuous => continuous::run(self, Drive::Target(target), noise, bound),
-            Stepping::Cr => sampled::follow(self, target, noise, bound),
-        }
-    }
-
     /// Whether there is no structure.
     pub(crate) fn is_alone(&self) -> bool {
         self.config.structure.n_dof() == 0
-    }
-
-    /// Seconds from the first sample to the last, if delays and noise go with them.
-    fn checked_duration(&self, n_samples: usize, noise: &Noise) -> Result<f64> {
-        let duration = (n_samples - 1) as f64 / self.config.rate_hz;
-        let mut checks = Checks::default();
-        for (i, actuator) in self.config.actuators.iter().enumerate() {
-            let longest = actuator.delay.range().1;
-            let key = format!("actuator[{}].delay_s", i + 1);
-            checks.demand(&key, longest < duration, &format!("less than the test's {duration} s"), longest);
-        }
-        for channel in noise.iter().flatten() {
-            checks.demand("noise", channel.len() == n_samples, &format!("{n_samples} samples"), channel.len());
-        }
-        if checks.mistakes.is_empty() { Ok(duration) } else { Err(Error::Configuration(checks.mistakes)) }
-    }
-
-    fn bound(&self, ground: &[f64], duration: f64) -> f64 {
-        let peak = crate::pair::peak(ground);
-        if peak == 0.0 {
-            return self.config.bound_m.unwrap_or(BOUND);
-        }
-        let omega = self.softest.iter().copied().find(|w| *w > 1e-6 * self.omega[self.omega.len() - 1]);
-        let scale = omega.map_or(0.5 * duration * duration, |w| (1.0 / (w * w)).min(0.5 * duration * duration));
-        let influence = self.config.structure.influence.amax().max(1.0);
-        self.config.bound_m.unwrap_or(BOUND * influence * peak * scale)
-    }
-
-    /// The delay at which the loop of the only actuator begins to ring; see [`CriticalDelay`].
-    ///
-    /// # Errors
-    /// [`Error::Configuration`] with more than one actuator.
-    pub fn critical_delay(&self) -> Result<CriticalDelay> {
-        Loop::new(self)?.critical_delay()
-    }
-
-    /// What a delay of the only actuator does to each mode's damping.
-    ///
-    /// # Errors
-    /// [`Error::Configuration`] with more than one actuator, or a delay that is negative or not finite.
-    pub fn delay_damping(&self, delay_s: f64) -> Result<DelayDamping> {
-        if !(delay_s.is_finite() && delay_s >= 0.0) {
-            return Err(configuration("delay_s", &format!("expected a number of at least 0, found {delay_s}")));
-        }
-        Loop::new(self)?.delay_damping(delay_s)
-    }
-
-    /// Measured over target of one actuator at a frequency, as configured; None where they are no one linear filter.
-    pub fn true_response(&self, actuator: usize, frequency_hz: f64) -> Option<num_complex::Complex<f64>> {
-        use num_complex::Complex;
-        let actuator = &self.config.actuators[actuator];
-        let omega = 2.0 * std::f64::consts::PI * frequency_hz;
-        let Delay::Constant(delay) = actuator.delay else { return None };
-        let line = actuator.gain * Complex::from_polar(1.0, -omega * delay);
-        let dynamics = match self.config.stepping {
-            Stepping::Continuous if matches!(actuator.dynamics, super::Dynamics::None) => Complex::new(1.0, 0.0),
-            Stepping::Continuous => actuator.linear_dynamics(false)?.response(Complex::new(0.0, omega)),
-            Stepping::Cr => super::SampledActuator::planned(actuator, self.config.rate_hz).response(omega)?,
-        };
-        Some(actuator.compensation.response(omega, self.config.rate_hz) * line * dynamics)
     }
 }
 
@@ -399,10 +274,6 @@ impl Element {
     pub(crate) fn across(&self, x: &[f64]) -> f64 {
         across(self.dof, self.from_dof, x)
     }
-}
-
-pub(crate) fn configuration(key: &str, message: &str) -> Error {
-    Error::Configuration(vec![Mistake { key: key.into(), message: message.into() }])
 }
 
 /// Circular frequencies of structure and specimens together, elastic, and when all has yielded.
@@ -438,13 +309,4 @@ fn whole(config: &TestConfig, left: &Numerical) -> Numerical {
         add_across(&mut whole.mass, actuator.dof, actuator.from_dof, actuator.specimen_mass);
     }
     whole
-}
-
-/// A force between two degrees of freedom added to a vector over all of them.
-#[inline]
-pub(crate) fn across_add(x: &mut [f64], dof: usize, from_dof: usize, value: f64) {
-    x[dof - 1] += value;
-    if from_dof > 0 {
-        x[from_dof - 1] -= value;
-    }
 }
