@@ -7,8 +7,8 @@ import itertools
 import numpy as np
 import pytest
 
-from rthstrack import display
-from rthstrack.tracking import Settings, Tracking
+from rthstrack.evaluation.tracking import Settings, Tracking
+from rthstrack.verdict import display
 
 
 @pytest.mark.parametrize(

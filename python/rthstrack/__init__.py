@@ -5,8 +5,6 @@ virtual tests to rehearse it with, whose structures, restoring forces and actuat
 """
 
 from rthstrack._core import __version__
-from rthstrack.assessment import Assessment, Limits, assess
-from rthstrack.configuration import read_configuration
 from rthstrack.errors import (
     ChannelError,
     ConfigurationError,
@@ -16,7 +14,7 @@ from rthstrack.errors import (
     SignalError,
     UnstableError,
 )
-from rthstrack.factors import (
+from rthstrack.evaluation.factors import (
     FactorChanges,
     Factors,
     KeyFrequencies,
@@ -24,14 +22,9 @@ from rthstrack.factors import (
     choose_factors,
     key_frequencies,
 )
-from rthstrack.ground_motion import GroundMotion, list_records, read_ground_motion, record, synthetic_ground_motion
-from rthstrack.monitor import Monitor, MonitorSettings, Readings, causal_decimate
-from rthstrack.presets import PRESETS, preset
-from rthstrack.recording import Channel, Recording, propose_pair, read_recording
-from rthstrack.report import write_report
-from rthstrack.studies import Study, study
-from rthstrack.target_motion import RecordedTarget, SineTarget, SweepTarget, read_target
-from rthstrack.tracking import (
+from rthstrack.evaluation.monitor import Monitor, MonitorSettings, Readings, causal_decimate
+from rthstrack.evaluation.presets import PRESETS, preset
+from rthstrack.evaluation.tracking import (
     BadSamples,
     Evaluator,
     FrequencyResponse,
@@ -48,7 +41,19 @@ from rthstrack.tracking import (
     index_histories,
     indices,
 )
-from rthstrack.virtual_test import (
+from rthstrack.ground_motion.motion import (
+    GroundMotion,
+    list_records,
+    read_ground_motion,
+    record,
+    synthetic_ground_motion,
+)
+from rthstrack.recording.recording import Channel, Recording, propose_pair, read_recording
+from rthstrack.report.page import write_report
+from rthstrack.studies.grid import Study, study
+from rthstrack.verdict.assessment import Assessment, Limits, assess
+from rthstrack.virtual_test.configuration import read_configuration
+from rthstrack.virtual_test.parts import (
     CriticalDelay,
     DelayDamping,
     Run,
@@ -59,6 +64,7 @@ from rthstrack.virtual_test import (
     simulate_many,
     true_tracking,
 )
+from rthstrack.virtual_test.target_motion import RecordedTarget, SineTarget, SweepTarget, read_target
 
 __all__ = [
     "PRESETS",

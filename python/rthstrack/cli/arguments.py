@@ -7,8 +7,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rthstrack.presets import PRESETS
-from rthstrack.tracking import Settings
+from rthstrack.evaluation.presets import PRESETS
+from rthstrack.evaluation.tracking import Settings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rthstrack.errors import ChannelError, RecordingError
-from rthstrack.readers import read_contents
-from rthstrack.recording import Recording, propose_pair, recording_from
+from rthstrack.recording.readers import read_contents
+from rthstrack.recording.recording import Recording, propose_pair, recording_from
 
 if TYPE_CHECKING:
     import argparse

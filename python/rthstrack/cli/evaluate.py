@@ -13,8 +13,6 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rthstrack import display
-from rthstrack.assessment import Assessment, Limits, assess, json_ready, result_entry, without_trusted
 from rthstrack.cli.arguments import (
     NOT_GIVEN,
     add_method,
@@ -27,12 +25,14 @@ from rthstrack.cli.arguments import (
     tolerance,
     weight_power,
 )
-from rthstrack.display import with_interval
 from rthstrack.errors import RecordingError, RthstrackError, SettingError, SignalError
-from rthstrack.factors import TOLERANCE
-from rthstrack.recording import Recording, propose_pair, read_recording
-from rthstrack.tracking import Evaluator, Settings
-from rthstrack.verdict import reason
+from rthstrack.evaluation.factors import TOLERANCE
+from rthstrack.evaluation.tracking import Evaluator, Settings
+from rthstrack.recording.recording import Recording, propose_pair, read_recording
+from rthstrack.verdict import display
+from rthstrack.verdict.argument import reason
+from rthstrack.verdict.assessment import Assessment, Limits, assess, json_ready, result_entry, without_trusted
+from rthstrack.verdict.display import with_interval
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from rthstrack.tracking import MovingTracking
+    from rthstrack.evaluation.tracking import MovingTracking
 
 FAILED, EXCEEDED = 1, 3
 _FIGURES = (".png", ".pdf", ".svg")
@@ -302,12 +302,12 @@ def _write_outputs(args: argparse.Namespace, assessments: Sequence[Assessment]) 
     notes = []
     try:
         if args.report is not None:
-            from rthstrack.report import write_report
+            from rthstrack.report.page import write_report
 
             write_report(assessments, args.report)
             notes.append(f"report written to {args.report}")
         if args.figure is not None:
-            from rthstrack.plots import write_figure
+            from rthstrack.plots.assessment import write_figure
 
             for a, path in _figure_paths(args.figure, assessments):
                 write_figure(a, path)

@@ -13,7 +13,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rthstrack.assessment import json_ready
 from rthstrack.cli.arguments import (
     NOT_GIVEN,
     add_method,
@@ -26,8 +25,8 @@ from rthstrack.cli.arguments import (
     tolerance,
 )
 from rthstrack.errors import RthstrackError, SettingError
-from rthstrack.factors import TOLERANCE
-from rthstrack.studies import (
+from rthstrack.evaluation.factors import TOLERANCE
+from rthstrack.studies.grid import (
     COMBINED,
     POWERS,
     WEIGHT_POWERS,
@@ -39,6 +38,7 @@ from rthstrack.studies import (
     read_pairs,
     study,
 )
+from rthstrack.verdict.assessment import json_ready
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -46,8 +46,8 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from rthstrack.studies import Cell
-    from rthstrack.tracking import Settings
+    from rthstrack.evaluation.tracking import Settings
+    from rthstrack.studies.grid import Cell
 
 FAILED = 1
 _DESCRIPTION = """\
@@ -300,7 +300,7 @@ def _write(found: Study, args: argparse.Namespace) -> list[str]:
     found.to_csv(path)
     notes = [f"cells written to {path}"]
     if not args.no_figures:
-        from rthstrack.study_plots import write_study_figures
+        from rthstrack.plots.study import write_study_figures
 
         figures = write_study_figures(found, args.output)
         notes.append(f"{len(figures)} figures written to {args.output}: {', '.join(p.name for p in figures)}")

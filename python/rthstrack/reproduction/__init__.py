@@ -13,6 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
+from rthstrack.evaluation.tracking import FrequencySlopes, frequency_slopes
 from rthstrack.reproduction import far_field as far_field_set
 from rthstrack.reproduction import paper, paper_form
 from rthstrack.reproduction.cases import (
@@ -28,12 +29,11 @@ from rthstrack.reproduction.cases import (
 )
 from rthstrack.reproduction.far_field import WINDOWS, Component
 from rthstrack.reproduction.paper_form import Reading, Timing
-from rthstrack.studies import Cell, Study, study
-from rthstrack.tracking import FrequencySlopes, frequency_slopes
+from rthstrack.studies.grid import Cell, Study, study
 
 if TYPE_CHECKING:
     from rthstrack.reproduction.claims import Claim
-    from rthstrack.virtual_test import Run
+    from rthstrack.virtual_test.parts import Run
 
 __all__ = ["Reproduction", "reproduce"]
 

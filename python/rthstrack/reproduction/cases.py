@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Literal, TypeAlias
 
 from rthstrack.errors import SettingError, UnstableError
-from rthstrack.ground_motion import GroundMotion, read_ground_motion, record
+from rthstrack.ground_motion.motion import GroundMotion, read_ground_motion, record
 from rthstrack.reproduction import paper
-from rthstrack.virtual_test import (
+from rthstrack.virtual_test.parts import (
     Actuator,
     BaberWen,
     BoucWen,

@@ -16,12 +16,12 @@ import matplotlib.ticker
 import numpy as np
 from matplotlib.figure import Figure
 
-from rthstrack import display
-from rthstrack.plots import DOUBLE_COLUMN_IN, MEASURED, MUTED, SECOND, TARGET, VALUE, _style
+from rthstrack.plots.assessment import DOUBLE_COLUMN_IN, MEASURED, MUTED, SECOND, TARGET, VALUE, _style
 from rthstrack.reproduction import CHEBYSHEV, HANN, LOWERED, ROUTES, SCIPY, SPECTRAL, TRANSFER, TUKEY, paper
 from rthstrack.reproduction.cases import CASES, Case
 from rthstrack.reproduction.claims.rows import component_seen, errors
 from rthstrack.reproduction.time_model import time_model
+from rthstrack.verdict import display
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

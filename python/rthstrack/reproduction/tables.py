@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
 
-from rthstrack.plots import DOUBLE_COLUMN_IN, MUTED, _style
+from rthstrack.plots.assessment import DOUBLE_COLUMN_IN, MUTED, _style
 from rthstrack.reproduction import CHEBYSHEV, SCIPY, SPECTRAL, paper
 from rthstrack.reproduction.cases import CASES
 

@@ -15,7 +15,7 @@ import scipy
 
 from rthstrack._core import __version__
 from rthstrack.errors import RecordingError, SettingError
-from rthstrack.plots import _style
+from rthstrack.plots.assessment import _style
 from rthstrack.reproduction import figures, paper, tables
 from rthstrack.reproduction.claims import MEANINGS, TERMS, WORDS, Claim
 from rthstrack.reproduction.far_field import WINDOWS

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rthstrack.factors import key_frequencies
-from rthstrack.monitor import Monitor
+from rthstrack.evaluation.factors import key_frequencies
+from rthstrack.evaluation.monitor import Monitor
+from rthstrack.evaluation.tracking import evaluate
 from rthstrack.reproduction import SCIPY, SPECTRAL, paper
 from rthstrack.reproduction.claims.combined import spans
 from rthstrack.reproduction.claims.frequency_decimation import RECORDS
@@ -33,7 +34,6 @@ from rthstrack.reproduction.claims.rows import (
     slip,
     timed,
 )
-from rthstrack.tracking import evaluate
 
 if TYPE_CHECKING:
     from rthstrack.reproduction import Reproduction

@@ -48,7 +48,7 @@ from rthstrack.reproduction.claims.rows import (
 )
 from rthstrack.reproduction.far_field import WINDOWS, discrepancy, largest_indicator
 from rthstrack.reproduction.paper_form import order_of_matlab
-from rthstrack.virtual_test import BoucWen
+from rthstrack.virtual_test.parts import BoucWen
 
 if TYPE_CHECKING:
     from rthstrack.reproduction import Reproduction

@@ -45,7 +45,7 @@ from rthstrack.reproduction.claims.rows import (
 
 if TYPE_CHECKING:
     from rthstrack.reproduction import Reproduction
-    from rthstrack.virtual_test import Run
+    from rthstrack.virtual_test.parts import Run
 
 #: The equivalent frequency of the experiment, at which the printed delays are compared with the residual.
 _FREQUENCY_HZ = 0.66

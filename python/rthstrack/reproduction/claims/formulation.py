@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rthstrack.evaluation.tracking import evaluate, indices
 from rthstrack.reproduction import SPECTRAL, paper
 from rthstrack.reproduction.claims.rows import (
     ENDS,
@@ -29,11 +30,10 @@ from rthstrack.reproduction.claims.rows import (
     slip,
 )
 from rthstrack.reproduction.far_field import WINDOWS
-from rthstrack.tracking import evaluate, indices
 
 if TYPE_CHECKING:
     from rthstrack.reproduction import Reproduction
-    from rthstrack.virtual_test import Run
+    from rthstrack.virtual_test.parts import Run
 
 #: A phase beyond 90 degrees, to show what an arctangent of a ratio forgets; not the paper's.
 _EXAMPLE_S, _EXAMPLE_HZ = 0.060, 4.8

@@ -7,15 +7,15 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
+from rthstrack.evaluation.tracking import evaluate
 from rthstrack.reproduction import LOWERED, ROUTES, SCIPY, SPECTRAL, paper
 from rthstrack.reproduction.cases import CASES
 from rthstrack.reproduction.far_field import OWN_FILTER, WINDOWS
-from rthstrack.tracking import evaluate
 
 if TYPE_CHECKING:
     from rthstrack.reproduction import Reproduction
     from rthstrack.reproduction.far_field import Component
-    from rthstrack.virtual_test import Run
+    from rthstrack.virtual_test.parts import Run
 
 Verdict: TypeAlias = Literal[
     "agrees", "agrees_in_paper_form", "slip", "setting", "time", "differs", "not_compared", "not_judged"
