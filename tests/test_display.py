@@ -7,7 +7,8 @@ import itertools
 import numpy as np
 import pytest
 
-from rthstrack.evaluation.tracking import Settings, Tracking
+from rthstrack.evaluation.settings import Settings
+from rthstrack.evaluation.tracking import Tracking
 from rthstrack.verdict import display
 
 

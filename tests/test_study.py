@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 from rthstrack import plots
 from rthstrack.errors import RecordingError, SettingError, SignalError
-from rthstrack.evaluation.tracking import Settings
+from rthstrack.evaluation.settings import Settings
 from rthstrack.plots import study as study_plots
 from rthstrack.studies import Cell, Pair, StudiedSource, Study, StudySettings, read_pairs, study
 from tolerances import physical, round_off

@@ -14,6 +14,7 @@ from rthstrack.errors import (
     SignalError,
     UnstableError,
 )
+from rthstrack.evaluation.bad_samples import BadSamples
 from rthstrack.evaluation.factors import (
     FactorChanges,
     Factors,
@@ -22,42 +23,29 @@ from rthstrack.evaluation.factors import (
     choose_factors,
     key_frequencies,
 )
-from rthstrack.evaluation.monitor import Monitor, MonitorSettings, Readings, causal_decimate
+from rthstrack.evaluation.indices import IndexHistories, Indices, index_histories, indices
+from rthstrack.evaluation.monitor import Monitor, Readings, causal_decimate
 from rthstrack.evaluation.presets import PRESETS, preset
-from rthstrack.evaluation.tracking import (
-    BadSamples,
-    Evaluator,
-    FrequencyResponse,
-    FrequencySlopes,
-    IndexHistories,
-    Indices,
-    MovingTracking,
-    Settings,
-    Tracking,
-    evaluate,
-    evaluate_moving,
-    frequency_response,
-    frequency_slopes,
-    index_histories,
-    indices,
-)
-from rthstrack.ground_motion.motion import (
-    GroundMotion,
-    list_records,
-    read_ground_motion,
-    record,
-    synthetic_ground_motion,
-)
-from rthstrack.recording.recording import Channel, Recording, propose_pair, read_recording
+from rthstrack.evaluation.response import FrequencyResponse, FrequencySlopes, frequency_response, frequency_slopes
+from rthstrack.evaluation.settings import MonitorSettings, Settings
+from rthstrack.evaluation.tracking import Evaluator, MovingTracking, Tracking, evaluate, evaluate_moving
+from rthstrack.ground_motion.files import read_ground_motion
+from rthstrack.ground_motion.motion import GroundMotion
+from rthstrack.ground_motion.records import list_records, record
+from rthstrack.ground_motion.synthetic import synthetic_ground_motion
+from rthstrack.recording.pairing import propose_pair
+from rthstrack.recording.reading import read_recording
+from rthstrack.recording.recording import Channel, Recording
 from rthstrack.report.page import write_report
-from rthstrack.studies.grid import Study, study
-from rthstrack.verdict.assessment import Assessment, Limits, assess
+from rthstrack.studies.cells import Study
+from rthstrack.studies.grid import study
+from rthstrack.verdict.assessment import Assessment, assess
+from rthstrack.verdict.limits import Limits
 from rthstrack.virtual_test.configuration import read_configuration
-from rthstrack.virtual_test.parts import (
-    CriticalDelay,
+from rthstrack.virtual_test.parts import VirtualTest
+from rthstrack.virtual_test.run import CriticalDelay, Run
+from rthstrack.virtual_test.simulation import (
     DelayDamping,
-    Run,
-    VirtualTest,
     critical_delay,
     delay_damping,
     simulate,

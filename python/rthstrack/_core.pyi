@@ -5,8 +5,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from rthstrack.evaluation.monitor import MonitorSettings
-from rthstrack.evaluation.tracking import Settings
+from rthstrack.evaluation.settings import MonitorSettings, Settings
 from rthstrack.virtual_test import parts as virtual_test
 
 __all__ = [

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rthstrack.errors import ChannelError, RecordingError
+from rthstrack.recording.pairing import propose_pair
 from rthstrack.recording.readers import read_contents
-from rthstrack.recording.recording import Recording, propose_pair, recording_from
+from rthstrack.recording.reading import recording_from
+from rthstrack.recording.recording import Recording
 
 if TYPE_CHECKING:
     import argparse

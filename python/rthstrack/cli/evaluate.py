@@ -27,12 +27,18 @@ from rthstrack.cli.arguments import (
 )
 from rthstrack.errors import RecordingError, RthstrackError, SettingError, SignalError
 from rthstrack.evaluation.factors import TOLERANCE
-from rthstrack.evaluation.tracking import Evaluator, Settings
-from rthstrack.recording.recording import Recording, propose_pair, read_recording
+from rthstrack.evaluation.results import json_ready
+from rthstrack.evaluation.settings import Settings
+from rthstrack.evaluation.tracking import Evaluator
+from rthstrack.recording.pairing import propose_pair
+from rthstrack.recording.reading import read_recording
+from rthstrack.recording.recording import Recording
 from rthstrack.verdict import display
-from rthstrack.verdict.argument import reason
-from rthstrack.verdict.assessment import Assessment, Limits, assess, json_ready, result_entry, without_trusted
+from rthstrack.verdict.assessment import Assessment, assess, without_trusted
 from rthstrack.verdict.display import with_interval
+from rthstrack.verdict.entry import result_entry
+from rthstrack.verdict.limits import Limits
+from rthstrack.verdict.sentence import reason
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence

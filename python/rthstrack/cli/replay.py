@@ -16,7 +16,8 @@ from rthstrack.cli.arguments import add_signals, count, positive
 from rthstrack.cli.running import Ended, say
 from rthstrack.errors import RecordingError, RthstrackError, SettingError
 from rthstrack.live.layout import DatagramLayout, default_layout, read_layout
-from rthstrack.recording.recording import propose_pair, read_recording
+from rthstrack.recording.pairing import propose_pair
+from rthstrack.recording.reading import read_recording
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -14,14 +14,14 @@ import numpy as np
 from rthstrack.cli.arguments import path, positive
 from rthstrack.errors import ConfigurationError, SettingError
 from rthstrack.virtual_test.configuration import read_configuration
-from rthstrack.virtual_test.parts import delay_damping, simulate, true_tracking
+from rthstrack.virtual_test.simulation import delay_damping, simulate, true_tracking
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import NDArray
 
-    from rthstrack.virtual_test.parts import Run
+    from rthstrack.virtual_test.run import Run
 
 # Frequencies listed of a structure with many.
 _MOST_MODES = 6

@@ -26,19 +26,11 @@ from rthstrack.cli.arguments import (
 )
 from rthstrack.errors import RthstrackError, SettingError
 from rthstrack.evaluation.factors import TOLERANCE
-from rthstrack.studies.grid import (
-    COMBINED,
-    POWERS,
-    WEIGHT_POWERS,
-    WINDOWS,
-    Pair,
-    Study,
-    StudySettings,
-    _several,
-    read_pairs,
-    study,
-)
-from rthstrack.verdict.assessment import json_ready
+from rthstrack.evaluation.results import json_ready
+from rthstrack.studies.cells import Study
+from rthstrack.studies.grid import study
+from rthstrack.studies.pairs import Pair, read_pairs
+from rthstrack.studies.settings import COMBINED, POWERS, WEIGHT_POWERS, WINDOWS, StudySettings, _several
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -46,8 +38,8 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from rthstrack.evaluation.tracking import Settings
-    from rthstrack.studies.grid import Cell
+    from rthstrack.evaluation.settings import Settings
+    from rthstrack.studies.cells import Cell
 
 FAILED = 1
 _DESCRIPTION = """\

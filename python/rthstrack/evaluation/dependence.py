@@ -14,14 +14,15 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
-from rthstrack.evaluation.tracking import _Result
+from rthstrack.evaluation.results import _Result
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from rthstrack.evaluation.tracking import FrequencyResponse, Tracking
+    from rthstrack.evaluation.response import FrequencyResponse
+    from rthstrack.evaluation.tracking import Tracking
 
     Floats: TypeAlias = NDArray[np.float64]
 

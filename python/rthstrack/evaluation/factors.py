@@ -13,7 +13,10 @@ import numpy as np
 
 import rthstrack._core as _core
 from rthstrack.errors import SettingError, SignalError
-from rthstrack.evaluation.tracking import Settings, Tracking, _count, _number, _plan, _Result, _samples, _single
+from rthstrack.evaluation.inputs import _count, _number, _samples, _single
+from rthstrack.evaluation.results import _Result
+from rthstrack.evaluation.settings import Settings
+from rthstrack.evaluation.tracking import Tracking, _plan
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

@@ -10,29 +10,12 @@ import numpy as np
 
 import rthstrack._core as _core
 from rthstrack.errors import SettingError, SignalError
-from rthstrack.evaluation.tracking import _band, _count, _ends, _number, _Result, _samples
+from rthstrack.evaluation.inputs import _band, _count, _number, _samples
+from rthstrack.evaluation.results import _ends, _Result
+from rthstrack.evaluation.settings import MonitorSettings
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
-
-
-@dataclass(frozen=True, slots=True)
-class MonitorSettings:
-    """How a stream is evaluated; the words and defaults are those of `Monitor`."""
-
-    rate_hz: float
-    window_s: float = 4.0
-    update_hz: float = 64.0
-    band_hz: tuple[float, float] | None = None
-    window: str = "boxcar"
-    detrend: str = "mean"
-    estimator: str = "fei"
-    data_decimation: int = 1
-    frequency_decimation: int = 1
-    max_delay_s: float = 0.25
-    expected_delay_s: float | None = None
-    minimum_amplitude: float = 0.0
-    n_actuators: int = 1
 
 
 @dataclass(frozen=True, slots=True)

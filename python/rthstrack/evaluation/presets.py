@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from rthstrack.errors import SettingError
-from rthstrack.evaluation.tracking import Settings
+from rthstrack.evaluation.settings import Settings
 from rthstrack.keyed_table import suggestion
 
 if TYPE_CHECKING:

@@ -6,6 +6,17 @@ window opens. Colours are Okabe and Ito's, as on the report's page.
 """
 
 from rthstrack.plots.assessment import (
+    figure,
+    plot_error,
+    plot_frequency_response,
+    plot_indices,
+    plot_loop,
+    plot_moving,
+    plot_spectra,
+    plot_time_history,
+    write_figure,
+)
+from rthstrack.plots.style import (
     BAND,
     DOUBLE_COLUMN_IN,
     DOUBTFUL,
@@ -18,15 +29,6 @@ from rthstrack.plots.assessment import (
     TARGET,
     THIRD,
     VALUE,
-    figure,
-    plot_error,
-    plot_frequency_response,
-    plot_indices,
-    plot_loop,
-    plot_moving,
-    plot_spectra,
-    plot_time_history,
-    write_figure,
 )
 
 __all__ = [

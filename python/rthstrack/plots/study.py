@@ -19,7 +19,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rthstrack.errors import SettingError
-from rthstrack.plots.assessment import (
+from rthstrack.plots.style import (
     DOUBLE_COLUMN_IN,
     MEASURED,
     MUTED,
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from rthstrack.studies.grid import Cell, Study
+    from rthstrack.studies.cells import Cell, Study
 
 _COLOURS = (VALUE, MEASURED, SECOND, THIRD, "#e69f00", "#56b4e9", TARGET)
 _MARKERS = "os^Dvx+"

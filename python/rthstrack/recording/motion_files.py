@@ -13,7 +13,7 @@ import numpy as np
 from rthstrack.errors import ChannelError, RecordingError, SettingError
 from rthstrack.recording.readers.at2 import decoded, numbers
 from rthstrack.recording.readers.stamps import Irregular, examine
-from rthstrack.recording.recording import read_recording
+from rthstrack.recording.reading import read_recording
 
 if TYPE_CHECKING:
     import os

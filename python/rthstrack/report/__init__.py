@@ -4,7 +4,8 @@ The page takes what an `Assessment` holds and computes nothing. It loads nothing
 samples are inside, and a content security policy forbids anything else. Texts from files are escaped everywhere.
 """
 
-from rthstrack.report.page import report_html, result_record, write_report
+from rthstrack.report.page import report_html, write_report
+from rthstrack.report.record import result_record
 
 __all__ = [
     "report_html",

@@ -6,40 +6,29 @@ samples are inside, and a content security policy forbids anything else. Texts f
 
 from __future__ import annotations
 
-import base64
 import dataclasses
-import hashlib
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
 from html import escape
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rthstrack._core import __version__
+from rthstrack.assets import asset, digest
 from rthstrack.errors import SettingError
+from rthstrack.report.drawing import _Blocks, _drawing, _signal
+from rthstrack.report.record import NOT_DETERMINED, _reasons, _why, result_record
+from rthstrack.report.written import _flat, _interval, _number, _setting
 from rthstrack.verdict import display
-from rthstrack.verdict.argument import reason
-from rthstrack.verdict.assessment import json_ready, result_entry
+from rthstrack.verdict.sentence import reason
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from collections.abc import Mapping, Sequence
 
-    from rthstrack.evaluation.tracking import FrequencySlopes, MovingTracking
     from rthstrack.verdict.assessment import Assessment
-
-#: More samples than this are drawn by their extremes.
-DRAWN_SAMPLES = 200_000
-#: More points of a curve (spectrum, history, moving evaluation) than this are drawn by their extremes.
-DRAWN_POINTS = 6_000
-
-NOT_DETERMINED = "not determined"
-
-_ESTIMATORS = {"fei": "published", "aligned": "aligned", "least_squares": "least squares"}
 
 _INDICES = (
     # name, field, unit, factor to the unit shown, field in percent, what it is
@@ -51,30 +40,6 @@ _INDICES = (
     ("J3", "j3_percent", "%", 1.0, None, "peak error over peak {target}"),
     ("Energy error", "energy_error", "", 1.0, None, "work over {measured} less work over {target}"),
 )
-
-_SETTING_NAMES = {
-    "estimator": "Estimator",
-    "data_decimation": "Data decimation P",
-    "frequency_decimation": "Frequency decimation Q",
-    "decimator": "Decimator",
-    "weight_power": "Weight power l",
-    "window": "Window",
-    "detrend": "Detrend",
-    "band_hz": "Band",
-    "max_delay_s": "Largest delay looked for",
-    "expected_delay_s": "Expected delay",
-    "noise": "Noise on measured",
-    "noise_ratio": "Noise on target over that on measured",
-    "bad_samples": "Bad samples",
-    "moving_s": "Moving windows",
-    "hop_s": "One moving window every",
-    "rate_source": "Rate from",
-    "start_s": "Cut before",
-    "end_s": "Cut after",
-    "n_filled": "Filled samples",
-    "fill": "Fill gaps up to (samples)",
-    "resample_hz": "Resampled to",
-}
 
 
 def write_report(assessments: Sequence[Assessment], path: str | Path) -> None:
@@ -104,12 +69,12 @@ def report_html(assessments: Sequence[Assessment]) -> str:
         "created": created.isoformat(timespec="seconds"),
         "results": [result_record(assessment) for assessment in assessments],
     }
-    style = "\n".join(_asset(name) for name in ("uPlot.min.css", "charts.css", "report.css"))
-    licence = f"/*! uPlot 1.6.32\n{_asset('uPlot.LICENSE').strip()}\n*/\n"
-    scripts = [licence + _asset("uPlot.iife.min.js"), _asset("charts.js"), _asset("report.js")]
+    style = "\n".join(asset(name) for name in ("uPlot.min.css", "charts.css", "report.css"))
+    licence = f"/*! uPlot 1.6.32\n{asset('uPlot.LICENSE').strip()}\n*/\n"
+    scripts = [licence + asset("uPlot.iife.min.js"), asset("charts.js"), asset("report.js")]
     policy = (
-        f"default-src 'none'; img-src data:; style-src {_digest(style)}; "
-        f"script-src {' '.join(_digest(script) for script in scripts)}; base-uri 'none'; form-action 'none'"
+        f"default-src 'none'; img-src data:; style-src {digest(style)}; "
+        f"script-src {' '.join(digest(script) for script in scripts)}; base-uri 'none'; form-action 'none'"
     )
     several = len(assessments) > 1
     n_files = len({assessment.file for assessment in assessments})
@@ -160,393 +125,10 @@ def report_html(assessments: Sequence[Assessment]) -> str:
     return "\n".join(parts)
 
 
-def result_record(assessment: Assessment) -> dict[str, Any]:
-    """The numbers of one assessment at full precision, ready for JSON; a number that is not determined is None."""
-    a = assessment
-    record = result_entry(a) | {
-        "part": a.part,
-        "start_s": a.start_s,
-        "indices": dataclasses.asdict(a.indices),
-        "moving": None,
-        "trusted_moving": None,
-        "response": None,
-        "verdict": a.verdict,
-        "warnings": a.warnings,
-        "limits": dataclasses.asdict(a.limits),
-        "exceeded": a.exceeded,
-        "not_determined": _reasons(a),
-    }
-    if a.moving is not None:
-        record["moving"] = {
-            "window_s": a.moving.window_s,
-            "hop_s": a.moving.hop_s,
-            "minimum_std_ratio": a.moving.minimum_std_ratio,
-            "n_readings": int(a.moving.time_s.size),
-            "n_valid": int(np.count_nonzero(a.moving.valid)),
-        }
-    if a.trusted_moving is not None:
-        known = a.trusted_moving.valid
-        record["trusted_moving"] = {
-            "n_valid": int(np.count_nonzero(known)),
-            "n_intervals": int(np.count_nonzero(np.isfinite(a.trusted_moving.delay_interval_s[:, 0]))),
-            "reasons": [{"n": n, "first": text} for n, text in display.reasons(a.trusted_moving)],
-        }
-    if a.response is not None:
-        names = ("segment_s", "overlap", "n_segments", "window", "detrend", "align_s", "dispersion")
-        record["response"] = {name: getattr(a.response, name) for name in names}
-    return {key: json_ready(value) for key, value in record.items()}
-
-
-# ---------------------------------------------------------------------------------------------------- numbers and texts
-
-
-def _reasons(a: Assessment) -> dict[str, str]:
-    reasons: dict[str, str] = {}
-    for name in ("amplitude", "delay_s", "phase_rad", "equivalent_frequency_hz"):
-        if not math.isfinite(getattr(a.tracking, name)):
-            reasons[name] = _why(reason(a.tracking))
-    for index in dataclasses.fields(a.indices):
-        value = getattr(a.indices, index.name)
-        if value is None:
-            needs_force = index.name == "energy_error"
-            reasons[index.name] = "needs the measured force" if needs_force else "was not evaluated"
-        elif not math.isfinite(value):
-            reasons[index.name] = "the evaluation gave no finite number"
-    if (text := reason(a.trusted)) is not None:
-        reasons["trusted"] = _why(text)
-    if a.slopes is None:
-        reasons["slopes"] = _why(a.slopes_note)
-    if a.moving is None:
-        reasons["moving"] = _why(a.moving_note)
-    if a.response is None:
-        reasons["response"] = _why(a.response_note)
-    return reasons
-
-
-def _why(note: str | None) -> str:
-    """A note of the assessment as the reason alone; what it is the reason for is said where it is shown."""
-    return (note or "was not evaluated").removeprefix(f"{NOT_DETERMINED}: ")
-
-
-def _number(
-    field: str, value: float | None, unit: str = "", factor: float = 1.0, reason: str | None = None, digits: int = 4
-) -> str:
-    """A number as text with its unit; the machine-readable value beside it is in the unit of the field's name."""
-    if value is None or not math.isfinite(value):
-        why = f' <span class="reason">({escape(reason)})</span>' if reason else ""
-        return f'<span class="absent" data-field="{field}">{NOT_DETERMINED}{why}</span>'
-    shown = display.significant(value if isinstance(value, int) else float(value) * factor, digits)
-    tail = f'<span class="unit">{"" if unit == "°" else " "}{escape(unit)}</span>' if unit else ""
-    exact = value if isinstance(value, int) else repr(float(value))
-    return f'<data data-field="{field}" value="{exact}">{shown}{tail}</data>'
-
-
-def _interval(field: str, interval: Iterable[float], value: float, unit: str = "", factor: float = 1.0) -> str:
-    """A 95 % interval as text, to the digits that its width leaves; empty where there is none."""
-    low, high = (float(end) for end in interval)
-    if not math.isfinite(high - low):
-        return ""
-    text = display.with_interval(factor * value, (factor * low, factor * high)).partition(" (")[2].rstrip(")")
-    ends = f'data-low="{low!r}" data-high="{high!r}"'
-    shown = escape(text.replace("-", "\N{MINUS SIGN}") + (f" {unit}" if unit else ""))
-    return f'95 %: <span data-field="{field}" {ends}>{shown}</span>'
-
-
-def _flat(settings: Mapping[str, Any], before: str = "") -> list[tuple[str, Any]]:
-    rows: list[tuple[str, Any]] = []
-    for key, value in settings.items():
-        name = f"{before}{key}"
-        if isinstance(value, Mapping):
-            rows += _flat(value, f"{name} · ") if value else [(name, None)]
-        else:
-            rows.append((name, value))
-    return rows
-
-
-def _setting(name: str, value: Any) -> tuple[str, str]:
-    """A setting's name and value in words; the unit is the suffix of the name."""
-    unit = next((u for end, u in (("_hz", "Hz"), ("_s", "s"), ("_percent", "%")) if name.endswith(end)), "")
-    plain = name.removesuffix("_hz").removesuffix("_percent")
-    plain = plain.removesuffix("_s").replace("_", " ")
-    first, _, rest = name.partition(" · ")
-    label = _SETTING_NAMES.get(first, plain[:1].upper() + plain[1:])
-    if rest and first in _SETTING_NAMES:
-        label = f"{label}: {rest}"
-    if value is None or value == [] or value == ():
-        return label, "none"
-    if isinstance(value, bool):
-        return label, "yes" if value else "no"
-    if isinstance(value, list | tuple):
-        text = (" to " if len(value) == 2 and unit else ", ").join(_scalar(item) for item in value)
-    else:
-        text = _scalar(value)
-    return label, f"{text} {unit}" if unit else text
-
-
-def _scalar(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float | np.floating) else str(value)
-
-
-def _asset(name: str) -> str:
-    return (resources.files("rthstrack") / "assets" / name).read_text(encoding="utf-8")
-
-
-def _digest(text: str) -> str:
-    """The text's hash as a content security policy names it."""
-    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
-
-
 def _json_block(name: str, content: Any) -> str:
     """A JSON script block. With every < written as an escape, no text in it can end the block or open another."""
     text = json.dumps(content, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
     return f'<script type="application/json" id="{name}">{text.replace("<", chr(92) + "u003c")}</script>'
-
-
-# ---------------------------------------------------------------------------------------------------- what is drawn
-
-
-class _Blocks:
-    """The columns of samples on the page, each once: a channel shared by several assessments is stored once."""
-
-    def __init__(self) -> None:
-        self._texts: dict[str, str] = {}
-
-    def column(self, values: NDArray[Any]) -> dict[str, Any]:
-        """Store a column in single precision, of the distance from mid-range where that is far from zero."""
-        if values.dtype.kind in "iu":
-            return self._store(values.astype("<u4"), "u4", 0.0)
-        finite = values[np.isfinite(values)]
-        low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
-        # Only a true offset is worth it: off a spectrum, or a gain with one wild bin, it would round the rest away.
-        offset = (low + high) / 2 if 2 * (high - low) < max(abs(low), abs(high)) else 0.0
-        if 1e-30 < high - low < 1e30:
-            return self._store((values - offset).astype("<f4"), "f4", offset)
-        return self._store(values.astype("<f8"), "f8", 0.0)
-
-    def _store(self, values: NDArray[Any], kind: str, offset: float) -> dict[str, Any]:
-        raw = values.tobytes()
-        key = f"block-{hashlib.sha256(repr((kind, offset)).encode() + raw).hexdigest()[:16]}"
-        self._texts.setdefault(key, base64.b64encode(raw).decode())
-        return {"block": key, "type": kind, "offset": offset}
-
-    def html(self) -> str:
-        return "\n".join(f'<script type="text/plain" id="{key}">{text}</script>' for key, text in self._texts.items())
-
-
-def _kept_samples(a: Assessment) -> NDArray[np.intp] | None:
-    """The samples drawn, or None for all of them; six extremes a group make at most DRAWN_SAMPLES."""
-    if a.target.size <= DRAWN_SAMPLES:
-        return None
-    columns = (a.target, a.measured, a.measured - a.target)
-    return display.extremes(columns, display.even_edges(a.target.size, DRAWN_SAMPLES // 6))
-
-
-def _kept_points(columns: Sequence[NDArray[np.float64]], logarithmic: bool = False) -> NDArray[np.intp] | None:
-    n = columns[0].size
-    if n <= DRAWN_POINTS:
-        return None
-    # On a logarithmic axis the groups at low frequencies are single bins, and most curves peak together.
-    edges = display.log_edges(n, DRAWN_POINTS // 2) if logarithmic else display.even_edges(n, DRAWN_POINTS // 6)
-    return display.extremes(columns, edges)
-
-
-def _take(values: NDArray[Any], kept: NDArray[np.intp] | None) -> NDArray[Any]:
-    return values if kept is None else values[kept]
-
-
-def _drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any]:
-    drawing = {
-        "unit": a.unit or "",
-        "amplitude": a.tracking.amplitude,
-        "delay_s": a.tracking.delay_s,
-        "trusted_amplitude": a.trusted.amplitude,
-        "trusted_delay_s": a.trusted.delay_s,
-        "equivalent_frequency_hz": a.tracking.equivalent_frequency_hz,
-        "limits": dataclasses.asdict(a.limits),
-        "time": _time_drawing(a, blocks),
-        "histories": _histories_drawing(a, blocks),
-        "moving": _moving_drawing(a, blocks),
-        "spectrum": _spectrum_drawing(a, blocks),
-        "response": _response_drawing(a, blocks),
-        "frequency": _frequency_drawing(a),
-    }
-    plain = json_ready(drawing)
-    assert isinstance(plain, dict)
-    return plain
-
-
-def _time_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any]:
-    target_role, measured_role = display.signal_roles(a.part)
-    target_label, measured_label = _signal(target_role, a.target_name), _signal(measured_role, a.measured_name)
-    kept = _kept_samples(a)
-    first, end = display.strongest_span(a.target, a.rate_hz)
-    whole = end - first == a.target.size
-    return {
-        "start": a.start_s,
-        "step": 1 / a.rate_hz,
-        "n": a.target.size,
-        "index": None if kept is None else blocks.column(kept),
-        "drawn": a.target.size if kept is None else kept.size,
-        "target": blocks.column(_take(a.target, kept)),
-        "measured": blocks.column(_take(a.measured, kept)),
-        "strongest": None if whole else [a.start_s + first / a.rate_hz, a.start_s + (end - 1) / a.rate_hz],
-        "strongest_label": f"Strongest {display.STRONGEST_S:g} s",
-        "label": display.with_unit(display.quantity(a.unit), a.unit),
-        "error_label": display.with_unit("Error", a.unit),
-        "error_name": f"{measured_role} \N{MINUS SIGN} {target_role}",
-        "target_label": target_label,
-        "measured_label": measured_label,
-        "x_label": display.with_unit(target_label[0].upper() + target_label[1:], a.unit),
-        "y_label": display.with_unit(measured_label[0].upper() + measured_label[1:], a.unit),
-    }
-
-
-def _signal(role: str, name: str) -> str:
-    return role if name.lower() == role else f"{role}: {name}"
-
-
-def _histories_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any]:
-    h = a.histories
-    columns = {
-        "max_tracking_error": h.max_tracking_error,
-        "rms_error": h.rms_error,
-        "tracking_indicator": h.tracking_indicator,
-    }
-    if h.energy_error is not None:
-        columns["energy_error"] = h.energy_error
-    kept = _kept_points(list(columns.values()))
-    n = h.rms_error.size
-    return {
-        "start": a.start_s,
-        "step": 1 / h.rate_hz,
-        "n": n,
-        "index": None if kept is None else blocks.column(kept),
-        "drawn": n if kept is None else kept.size,
-        "error_label": display.with_unit("Error", a.unit),
-        "indicator_label": f"TI ({a.unit}²)" if a.unit else "TI (unit not stated)",
-        **{name: blocks.column(_take(column, kept)) for name, column in columns.items()},
-    }
-
-
-def _moving_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any] | None:
-    m = a.moving
-    if m is None or m.time_s.size == 0:
-        return None
-    columns = {"amplitude": np.where(m.valid, m.amplitude, np.nan), "delay_s": np.where(m.valid, m.delay_s, np.nan)}
-    if a.trusted_moving is not None:
-        columns |= _trusted_columns(a.trusted_moving)
-    kept = _kept_points(list(columns.values()))
-    edges = np.flatnonzero(np.diff(np.concatenate(([True], m.valid, [True])).astype(np.int8)))
-    half = m.hop_s / 2
-    invalid = [
-        [a.start_s + m.time_s[first] - half, a.start_s + m.time_s[end - 1] + half]
-        for first, end in zip(edges[::2], edges[1::2], strict=True)
-    ]
-    return {
-        "n": m.time_s.size,
-        "drawn": m.time_s.size if kept is None else kept.size,
-        "label": f"windows of {m.window_s:.4g} s",
-        "name": _ESTIMATORS[m.settings.estimator],
-        "both": a.trusted_moving is not a.moving,
-        "time": blocks.column(_take(a.start_s + m.time_s, kept)),
-        **{name: blocks.column(_take(column, kept)) for name, column in columns.items()},
-        "invalid": invalid,
-    }
-
-
-def _trusted_columns(m: MovingTracking) -> dict[str, NDArray[np.float64]]:
-    return {
-        "trusted_amplitude": np.where(m.valid, m.amplitude, np.nan),
-        "trusted_delay_s": np.where(m.valid, m.delay_s, np.nan),
-        "amplitude_low": m.amplitude_interval[:, 0],
-        "amplitude_high": m.amplitude_interval[:, 1],
-        "delay_low_s": m.delay_interval_s[:, 0],
-        "delay_high_s": m.delay_interval_s[:, 1],
-    }
-
-
-def _spectrum_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any] | None:
-    t = a.tracking
-    if t.frequency_hz is None or t.weights is None or t.target_spectrum is None or t.measured_spectrum is None:
-        return None
-    scale = display.fourier_scale(t)
-    target, measured = np.abs(t.target_spectrum) * scale, np.abs(t.measured_spectrum) * scale
-    kept = _kept_points([target, measured, t.weights], logarithmic=True)
-    return {
-        "n": t.frequency_hz.size,
-        "drawn": t.frequency_hz.size if kept is None else kept.size,
-        "frequency": blocks.column(_take(t.frequency_hz, kept)),
-        "target": blocks.column(_take(target, kept)),
-        "measured": blocks.column(_take(measured, kept)),
-        "weights": blocks.column(_take(t.weights, kept)),
-        "label": f"Fourier amplitude ({a.unit} s)" if a.unit else "Fourier amplitude (unit not stated)",
-        "unit": f"{a.unit} s" if a.unit else "",
-    }
-
-
-def _response_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any] | None:
-    r = a.response
-    if r is None:
-        return None
-    above_zero = r.frequency_hz > 0
-    frequency = r.frequency_hz[above_zero]
-    if frequency.size == 0:
-        return None
-    columns = {
-        name: column[above_zero]
-        for name, column in (
-            ("gain", r.gain),
-            ("delay_s", r.delay_s),
-            ("coherence", r.coherence),
-            ("gain_low", r.gain_interval[:, 0]),
-            ("gain_high", r.gain_interval[:, 1]),
-            ("delay_low_s", r.delay_interval_s[:, 0]),
-            ("delay_high_s", r.delay_interval_s[:, 1]),
-        )
-    }
-    kept = _kept_points(list(columns.values()), logarithmic=True)
-    return {
-        "n": frequency.size,
-        "drawn": frequency.size if kept is None else kept.size,
-        "low_coherence": display.LOW_COHERENCE,
-        "line": _slope_lines(a.slopes),
-        "frequency": blocks.column(_take(frequency, kept)),
-        **{name: blocks.column(_take(column, kept)) for name, column in columns.items()},
-    }
-
-
-def _slope_lines(s: FrequencySlopes | None) -> dict[str, Any] | None:
-    """The lines of gain and delay over the frequencies that they were fitted to: value + slope (f - at)."""
-    if s is None:
-        return None
-    return {
-        "band": s.band_hz,
-        "at": s.equivalent_frequency_hz,
-        "gain": [s.gain, s.gain_per_hz],
-        "delay_s": [s.delay_s, s.delay_s_per_hz],
-    }
-
-
-def _frequency_drawing(a: Assessment) -> dict[str, Any] | None:
-    """What the frequency axis spans, what it shows first, and the parts that were not judged."""
-    judged, welch = a.tracking.frequency_hz, None if a.response is None else a.response.frequency_hz
-    axes = [axis[axis > 0] for axis in (judged, welch) if axis is not None]
-    axes = [axis for axis in axes if axis.size]
-    if not axes:
-        return None
-    low, high = min(float(axis[0]) for axis in axes), max(float(axis[-1]) for axis in axes)
-    if not low < high:
-        return None
-    outside = []
-    if judged is not None and judged.size:
-        first, last = float(judged[0]), float(judged[-1])
-        outside = [[low, first]] * (first > low) + [[last, high]] * (last < high)
-    home = display.judged_range(a.tracking)
-    inside = home is not None and low <= home[0] < home[1] <= high
-    return {"extent": [low, high], "home": home if inside else [low, high], "outside": outside}
-
-
-# ---------------------------------------------------------------------------------------------------- the page's parts
 
 
 def _source(a: Assessment) -> str:
@@ -703,7 +285,7 @@ def _beside(a: Assessment, name: str, note: str) -> str:
     t = a.trusted
     unit, factor = ("ms", 1e3) if name == "delay_s" else ("", 1.0)
     field = "delay_interval_s" if name == "delay_s" else "amplitude_interval"
-    parts = [f"{_ESTIMATORS[a.tracking.settings.estimator]}; {note}".removesuffix("; ")]
+    parts = [f"{display.ESTIMATORS[a.tracking.settings.estimator]}; {note}".removesuffix("; ")]
     own = float(getattr(a.tracking, name))
     if a.tracking.settings.estimator != "fei" and math.isfinite(own):
         parts.append(_interval(field, getattr(a.tracking, field), own, unit, factor) or "no interval")

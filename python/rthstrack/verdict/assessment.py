@@ -7,55 +7,40 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from rthstrack.errors import SettingError, SignalError
-from rthstrack.evaluation.dependence import Dependence, dependence
-from rthstrack.evaluation.factors import TOLERANCE, Factors, choose_factors
-from rthstrack.evaluation.tracking import (
-    BadSamples,
-    Evaluator,
-    Settings,
-    _number,
-    _single,
-    bridged,
-    evaluate_moving,
-    frequency_response,
-    frequency_slopes,
-    index_histories,
-    indices,
-)
-from rthstrack.verdict import argument as words
+from rthstrack.evaluation.dependence import dependence
+from rthstrack.evaluation.factors import TOLERANCE, choose_factors
+from rthstrack.evaluation.indices import index_histories, indices
+from rthstrack.evaluation.inputs import _number, _single
+from rthstrack.evaluation.response import frequency_response, frequency_slopes
+from rthstrack.evaluation.settings import Settings
+from rthstrack.evaluation.tracking import Evaluator, bridged, evaluate_moving
+from rthstrack.verdict.argument import argument as argued
+from rthstrack.verdict.difference import differ
 from rthstrack.verdict.display import signal_roles
+from rthstrack.verdict.limits import Limits, exceeded, unchecked
+from rthstrack.verdict.sentence import reason, sentence, still_in_band, with_cause
+from rthstrack.verdict.warnings import warnings as found_warnings
 
 if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping
+
+    import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-    from rthstrack.evaluation.tracking import (
-        FrequencyResponse,
-        FrequencySlopes,
-        IndexHistories,
-        Indices,
-        MovingTracking,
-        Tracking,
-    )
+    from rthstrack.evaluation.dependence import Dependence
+    from rthstrack.evaluation.factors import Factors
+    from rthstrack.evaluation.indices import IndexHistories, Indices
+    from rthstrack.evaluation.response import FrequencyResponse, FrequencySlopes
+    from rthstrack.evaluation.tracking import MovingTracking, Tracking
 
 #: Length of a moving window unless told otherwise, in seconds, but never more than a quarter of the record.
 MOVING_S = 4.0
 #: Readings a window's length.
 READINGS_PER_WINDOW = 16
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """What the user allows: |delay_s| <= delay_s and |amplitude - 1| <= amplitude."""
-
-    delay_s: float | None = None
-    amplitude: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -146,7 +131,7 @@ def assess(
     factors = _chosen(t, m, rate_hz, settings, choose, tolerance) if choose else None
     for_record = settings if factors is None else factors.settings
     tracking = Evaluator(t.size, rate_hz, for_record).evaluate(t, m, weights=True)
-    still = words.still_in_band(t, tracking)
+    still = still_in_band(t, tracking)
     if still is not None:
         tracking = _without_numbers(tracking, still)
     for_windows = tracking.settings if factors is None else factors.reference.settings
@@ -186,21 +171,21 @@ def assess(
     response, response_note = _response(t, m, rate_hz, slopes, trusted)
     depends = dependence(t, m, without_bad, trusted, response)
     t, m = raw
-    same, trusted = tracking is trusted, words.with_cause(trusted, depends)
+    same, trusted = tracking is trusted, with_cause(trusted, depends)
     if same:
         tracking = trusted
     limits = limits or Limits()
     names = (target_name, measured_name)
     units = (unit, measured_unit or unit)
     found_indices = indices(t, m, rate_hz)
-    warnings = words.warnings(
+    warnings = found_warnings(
         t, m, tracking, trusted, moving, response, found_indices.rms_error_percent, depends, units, names
     )
     suspect = "mean" if "offset" in warnings and "drift" not in warnings else "linear"
-    variants = _variants(t, m, tracking, trusted_settings, slopes, suspect) if words.differ(tracking, trusted) else {}
+    variants = _variants(t, m, tracking, trusted_settings, slopes, suspect) if differ(tracking, trusted) else {}
     if without_bad is not tracking:
         variants["bad samples"] = without_bad
-    argument, said = words.argument(t, tracking, trusted, depends, slopes, variants, warnings, unit, start_s)
+    argument, said = argued(t, tracking, trusted, depends, slopes, variants, warnings, unit, start_s)
     evaluation = dataclasses.asdict(tracking.settings) | _factor_settings(factors)
     evaluation["expected_delay_s"] = trusted_settings.expected_delay_s
     return Assessment(
@@ -229,14 +214,14 @@ def assess(
         indices=found_indices,
         histories=index_histories(t, m, rate_hz),
         settings=evaluation | {"moving_s": window_s, "hop_s": hop_s} | dict(origin or {}),
-        verdict=words.sentence(tracking, *signal_roles(part)),
+        verdict=sentence(tracking, *signal_roles(part)),
         argument=argument,
         warnings=(
-            *words.unchecked(tracking, limits),
+            *unchecked(tracking, limits),
             *(text for name, text in warnings.items() if name != said),
         ),
         limits=limits,
-        exceeded=words.exceeded(tracking, limits),
+        exceeded=exceeded(tracking, limits),
         factors=factors,
     )
 
@@ -291,7 +276,7 @@ def _response(
         known_s, dispersion = slopes.align_s, slopes.dispersion
     else:
         known_s, dispersion = float(trusted.delay_s), False
-    note, unaligned = None, "" if math.isfinite(known_s) else str(words.reason(trusted) or "")
+    note, unaligned = None, "" if math.isfinite(known_s) else str(reason(trusted) or "")
     # A record may be long enough for segments, but not for segments that are moved.
     for align_s in (known_s, 0.0) if math.isfinite(known_s) else (0.0,):
         try:
@@ -377,107 +362,3 @@ def _factor_settings(factors: Factors | None) -> dict[str, Any]:
             "windowed": None if factors.windowed is None else factors.windowed.to_dict(),
         }
     }
-
-
-def result_entry(a: Assessment) -> dict[str, Any]:
-    """One result as `rthstrack evaluate --json` prints it: numbers at full precision, None where not determined."""
-    t, i = a.tracking, a.indices
-    entry: dict[str, Any] = {
-        "file": a.file,
-        "actuator": a.actuator,
-        "target": a.target_name,
-        "measured": a.measured_name,
-        "unit": a.unit,
-        "rate_hz": a.rate_hz,
-        "n_samples": t.n_samples,
-        "amplitude": t.amplitude,
-        "delay_s": t.delay_s,
-        "phase_rad": t.phase_rad,
-        "equivalent_frequency_hz": t.equivalent_frequency_hz,
-        "n_bins": t.n_bins,
-        "delta_f_hz": t.delta_f_hz,
-        **_precision(t),
-        "residual_coherence": t.residual_coherence,
-        "goodness": t.goodness,
-        "reason": words.reason(t),
-        "trusted": _trusted_entry(a.trusted),
-        "slopes": _slopes_entry(a.slopes, a.slopes_note),
-        "depends_on": a.depends_on,
-        "dependence": None if a.dependence is None else a.dependence.to_dict(),
-        "settings": a.settings,
-        "indices": {
-            "max_tracking_error": i.max_tracking_error,
-            "max_tracking_error_percent": i.max_tracking_error_percent,
-            "rms_error": i.rms_error,
-            "rms_error_percent": i.rms_error_percent,
-            "tracking_indicator": i.tracking_indicator,
-            "j1_s": i.j1_s,
-            "j2_percent": i.j2_percent,
-            "j3_percent": i.j3_percent,
-        },
-        "argument": a.argument,
-        "warnings": [*a.warnings, *a.exceeded],
-    }
-    return {key: json_ready(value) for key, value in entry.items()}
-
-
-def _precision(t: Tracking) -> dict[str, Any]:
-    return {
-        "amplitude_std": t.amplitude_std,
-        "amplitude_interval": _ends(t.amplitude_interval),
-        "delay_std_s": t.delay_std_s,
-        "delay_interval_s": _ends(t.delay_interval_s),
-    }
-
-
-def _ends(interval: Any) -> list[float] | None:
-    """Lower and upper end; None where there is no interval, rather than two ends that are none."""
-    ends = [float(end) for end in interval]
-    return ends if all(map(math.isfinite, ends)) else None
-
-
-def _trusted_entry(t: Tracking) -> dict[str, Any]:
-    return {
-        "estimator": t.settings.estimator,
-        "amplitude": t.amplitude,
-        "amplitude_interval": _ends(t.amplitude_interval),
-        "delay_s": t.delay_s,
-        "delay_interval_s": _ends(t.delay_interval_s),
-        "target_noise_std": t.target_noise_std,
-        "bad_samples": [dataclasses.asdict(bad) for bad in t.bad_samples if isinstance(bad, BadSamples)],
-        "reason": words.reason(t),
-    }
-
-
-_SLOPES = (
-    "equivalent_frequency_hz", "gain", "gain_interval", "gain_per_hz", "gain_per_hz_interval", "gain_misfit",
-    "gain_varies", "delay_s", "delay_interval_s", "delay_s_per_hz", "delay_s_per_hz_interval", "delay_misfit_s",
-    "delay_varies", "band_hz",
-)  # fmt: skip
-
-
-def _slopes_entry(slopes: FrequencySlopes | None, note: str | None) -> dict[str, Any]:
-    entry: dict[str, Any] = {name: None if slopes is None else getattr(slopes, name) for name in _SLOPES}
-    for name in _SLOPES:
-        if slopes is not None and "interval" in name:
-            entry[name] = _ends(entry[name])
-    return entry | {"reason": note}
-
-
-def json_ready(value: Any) -> Any:
-    """The value in types that JSON knows; NaN and infinities become None."""
-    if isinstance(value, bool | np.bool_):
-        return bool(value)
-    if isinstance(value, int | np.integer):
-        return int(value)
-    if isinstance(value, float | np.floating):
-        return float(value) if math.isfinite(value) else None
-    if isinstance(value, complex | np.complexfloating):
-        return [json_ready(value.real), json_ready(value.imag)]
-    if isinstance(value, Mapping):
-        return {str(key): json_ready(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return json_ready(value.tolist())
-    if isinstance(value, list | tuple):
-        return [json_ready(item) for item in value]
-    return value if value is None or isinstance(value, str) else str(value)

@@ -24,6 +24,9 @@ LOW_COHERENCE = 0.8
 #: The part of a record that is shown enlarged, in seconds.
 STRONGEST_S = 4.0
 
+#: What the estimators are called beside each other.
+ESTIMATORS = {"fei": "published", "aligned": "aligned", "least_squares": "least squares"}
+
 _ROLES = {"whole": ("target", "measured"), "compensator": ("target", "command"), "actuator": ("command", "measured")}
 _LENGTHS = {"m", "cm", "mm", "um", "µm", "μm", "in", "inch", "inches", "ft"}
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

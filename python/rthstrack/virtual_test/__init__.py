@@ -13,9 +13,7 @@ from rthstrack.virtual_test.parts import (
     BaberWen,
     BoucWen,
     Converter,
-    CriticalDelay,
     Dashpot,
-    DelayDamping,
     DelayHistory,
     Element,
     FirstOrder,
@@ -27,12 +25,15 @@ from rthstrack.virtual_test.parts import (
     ModalDamping,
     PolynomialExtrapolation,
     RayleighDamping,
-    Run,
     ServoHydraulic,
     Spring,
     Structure,
     TransferFunction,
     VirtualTest,
+)
+from rthstrack.virtual_test.run import CriticalDelay, Run
+from rthstrack.virtual_test.simulation import (
+    DelayDamping,
     critical_delay,
     delay_damping,
     simulate,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rthstrack.errors import ConfigurationError
-from rthstrack.ground_motion.motion import check_ground_motion, ground_motion_from
+from rthstrack.ground_motion.table import check_ground_motion, ground_motion_from
 from rthstrack.keyed_table import NUMBER, NUMBERS, SQUARE, Table, read_toml
 from rthstrack.virtual_test.parts import (
     OF_STRUCTURE,

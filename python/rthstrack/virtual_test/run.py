@@ -1,4 +1,4 @@
-"""The file of a virtual test: an HDF5 recording with the configuration that made it inside."""
+"""What a virtual test gave, and the file of it: an HDF5 recording with the configuration that made it inside."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 import math
 import os
 import secrets
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from rthstrack.virtual_test.parts import Run, VirtualTest
+    from rthstrack.virtual_test.parts import VirtualTest
+    from rthstrack.virtual_test.target_motion import TargetMotion
 
 PROGRAM = "rthstrack"
 
@@ -110,3 +112,54 @@ def _channels(run: Run) -> dict[str, tuple[NDArray[np.float64], str]]:
         channels |= {key: (column, unit) for key, column in columns.items()}
     channels |= {f"displacement_{i}": (column, "m") for i, column in enumerate(run.displacement.T, start=1)}
     return channels if run.ground_motion is None else channels | {"ground_motion": (run.ground_motion, "m/s^2")}
+
+
+@dataclass(frozen=True, slots=True)
+class CriticalDelay:
+    """The constant delay at which the loop's first pair of roots reaches the imaginary axis, and its frequency there.
+
+    `delay_s` 0: unstable even without a delay; infinite: no delay makes it unstable. `exact` False: of the elastic
+    stiffness of a structure or specimen that yields.
+    """
+
+    delay_s: float
+    frequency_hz: float
+    gain: float
+    exact: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """A finished virtual test. Signals are (n_samples,) for one actuator, else (n_samples, n_actuators); SI units.
+
+    displacement (n_samples, n_dof) relative to the ground, ground_motion (n_samples,) in m/s2, None for actuators
+    alone. `motion_name` and `motion_notes` are of ground motion or target, `target_motion` is the target as given.
+    `error_estimate` is the largest change of target and measured (and of the force, without a structure), over their
+    peaks, when the internal step is halved (NaN for cr).
+    """
+
+    test: VirtualTest
+    rate_hz: float
+    target: NDArray[np.float64]
+    command: NDArray[np.float64]
+    measured: NDArray[np.float64]
+    force: NDArray[np.float64]
+    displacement: NDArray[np.float64]
+    ground_motion: NDArray[np.float64] | None
+    motion_name: str
+    motion_notes: tuple[str, ...]
+    steps_per_sample: int
+    error_estimate: float
+    critical_delay: CriticalDelay | None
+    target_motion: TargetMotion | None = None
+
+    @property
+    def n_samples(self) -> int:
+        """Samples of each signal."""
+        return len(self.target)
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Writes the HDF5 recording that `read_recording` and `rthstrack evaluate` read."""
+        from rthstrack.virtual_test.run import write_run
+
+        write_run(self, path)
