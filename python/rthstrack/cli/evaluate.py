@@ -25,6 +25,7 @@ from rthstrack.cli.arguments import (
     tolerance,
     weight_power,
 )
+from rthstrack.cli.commands import COMMANDS
 from rthstrack.errors import RecordingError, RthstrackError, SettingError, SignalError
 from rthstrack.evaluation.factors import TOLERANCE
 from rthstrack.evaluation.results import json_ready
@@ -56,7 +57,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Adds the command to the command line."""
     parser = subparsers.add_parser(
         "evaluate",
-        help="judge how measured followed target in recorded tests",
+        help=COMMANDS["evaluate"],
         description="Judges how well the measured displacement followed the target, in amplitude and in time "
         "(Guo, Xu and Chen 2014). A positive delay means that measured lags. "
         "Exit status: 0 everything was evaluated, 1 some file failed, 2 misuse, 3 a limit was exceeded.",

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import rthstrack._core as _core
 from rthstrack.cli import addresses
+from rthstrack.cli.commands import COMMANDS
 from rthstrack.cli.monitor_options import Plan, add_options, checked_plan
 from rthstrack.cli.running import Ended, say
 from rthstrack.errors import RthstrackError, SettingError
@@ -54,7 +55,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Adds the command to the command line."""
     parser = subparsers.add_parser(
         "monitor",
-        help="gain and delay while the test runs, with alarms, a log and a live page",
+        help=COMMANDS["monitor"],
         description=_DESCRIPTION,
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,

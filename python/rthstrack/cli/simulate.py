@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rthstrack.cli.arguments import path, positive
+from rthstrack.cli.commands import COMMANDS
 from rthstrack.errors import ConfigurationError, SettingError
 from rthstrack.virtual_test.configuration import read_configuration
 from rthstrack.virtual_test.simulation import delay_damping, simulate, true_tracking
@@ -31,7 +32,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Adds the command to the command line."""
     parser = subparsers.add_parser(
         "simulate",
-        help="run a virtual test: part of a structure computed, part a specimen behind an actuator that lags",
+        help=COMMANDS["simulate"],
         description="Runs the virtual test that a TOML file describes (structure, restoring forces, actuators with "
         "their delay and compensation, ground motion; or actuators alone along a sine, a sweep or a recorded target; "
         "see docs/virtual-tests.md and examples/*.toml), says which delay its loop bears and what a delay costs in "

@@ -24,6 +24,7 @@ from rthstrack.cli.arguments import (
     settle,
     tolerance,
 )
+from rthstrack.cli.commands import COMMANDS
 from rthstrack.errors import RthstrackError, SettingError
 from rthstrack.evaluation.factors import TOLERANCE
 from rthstrack.evaluation.results import json_ready
@@ -74,7 +75,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Adds the command to the command line."""
     parser = subparsers.add_parser(
         "study",
-        help="what data decimation P and frequency decimation Q do to amplitude, delay and computing time",
+        help=COMMANDS["study"],
         description=_DESCRIPTION,
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
+from rthstrack.evaluation.chance import f_above, t_975
 from rthstrack.evaluation.results import _Result
 
 if TYPE_CHECKING:
@@ -181,8 +182,6 @@ class _Fit:
 
     def odds(self, first: int) -> float:
         """Probability that noise makes the coefficients from `first` on as large as they are."""
-        from scipy import special
-
         b = self.coefficients[first:]
         if not self.known:
             return 1.0
@@ -191,8 +190,20 @@ class _Fit:
             wald = float(b @ np.linalg.pinv(covariance[first:, first:], hermitian=True) @ b)
             # Hotelling's: the covariance is known from as many blocks only.
             f = max(wald, 0.0) / p * (self.free - p + 1) / self.free
-            odds = max(odds, float(special.fdtrc(p, max(self.free - p + 1, 1), f)))
+            odds = max(odds, f_above(p, max(self.free - p + 1, 1), f))
         return odds
+
+
+def _fast_length(n: int) -> int:
+    """The least 2^i 3^j 5^k that is n or more: a length that a real transform likes."""
+    best, fives = 1 << max(n - 1, 1).bit_length(), 1
+    while fives < best:
+        odd = fives
+        while odd < best:
+            best = min(best, odd << max(-(-n // odd) - 1, 0).bit_length())
+            odd *= 3
+        fives *= 5
+    return best
 
 
 def _spectra(target: Floats, measured: Floats, tracking: Tracking) -> tuple[NDArray[np.complex128], Floats, int]:
@@ -203,8 +214,6 @@ def _spectra(target: Floats, measured: Floats, tracking: Tracking) -> tuple[NDAr
 
     Taken over from the evaluation where it has them.
     """
-    from scipy import fft
-
     n, settings = target.size, tracking.settings
     few = 1 + n // 500
     ends = np.array([(part[:few].mean(), part[-few:].mean()) for part in (target, measured)])
@@ -232,16 +241,14 @@ def _spectra(target: Floats, measured: Floats, tracking: Tracking) -> tuple[NDAr
         energy = np.concatenate(([0.0], spectrum.real**2 + spectrum.imag**2))
     else:
         pair = np.stack((target, measured)) - first[:, None] - slope[:, None] * np.arange(n)
-        size = fft.next_fast_len(n + 16, real=True)
-        found = fft.rfft(pair, size, axis=1)
+        size = _fast_length(n + 16)
+        found = np.fft.rfft(pair, size, axis=1)
         energy = found[0].real ** 2 + found[0].imag ** 2
     energy[: found.shape[1]] = found[0].real ** 2 + found[0].imag ** 2
     return found, energy, size
 
 
 def _motion(target: Floats, measured: Floats, tracking: Tracking, trusted: Tracking) -> _Motion | None:
-    from scipy import fft
-
     n, delay_s, rate_hz = target.size, float(trusted.delay_s), trusted.rate_hz
     spectra, energy, size = _spectra(target, measured, tracking)
     df = rate_hz / size
@@ -257,7 +264,7 @@ def _motion(target: Floats, measured: Floats, tracking: Tracking, trusted: Track
     top = int(np.searchsorted(total, _ENERGY * total[-1])) + 2
     top = min(top, int(_MOST_SAMPLES / _OVERSAMPLING), energy.size - 1)
     last = min(int(_ROLL_OFF * top) + 2, spectra.shape[1] - 1)
-    m = fft.next_fast_len(max(int(_OVERSAMPLING * top) + 8, 2 * last + 2), real=True)
+    m = _fast_length(max(int(_OVERSAMPLING * top) + 8, 2 * last + 2))
     f = f_all[: last + 1]
     keep = np.where(
         f <= df * top, 1.0, np.cos(np.pi / 2 * np.clip((f - df * top) / max(df * (last - top), df), 0, 1)) ** 2
@@ -272,13 +279,13 @@ def _motion(target: Floats, measured: Floats, tracking: Tracking, trusted: Track
     w = 2j * np.pi * f
     g = (f - f_eq) / spread
     rows = np.stack((i, w * i, w * w * i, o, g * i, g * w * i, g * g * i, g * g * w * i))
-    series = fft.irfft(rows, m, axis=1) * (m / size)
-    harmonics = fft.rfft(np.sign(series[:2]), axis=1)
+    series = np.fft.irfft(rows, m, axis=1) * (m / size)
+    harmonics = np.fft.rfft(np.sign(series[:2]), axis=1)
     harmonics[:, : last + 1] *= keep
     harmonics[:, last + 1 :] = 0.0
-    signs = fft.irfft(harmonics, m, axis=1)
+    signs = np.fft.irfft(harmonics, m, axis=1)
     # Only positive frequencies: the modulus is the oscillation's amplitude.
-    analytic = fft.ifft(2 * i, m) * (m / size)
+    analytic = np.fft.ifft(2 * i, m) * (m / size)
     step_s = size / (m * rate_hz)
     period = max(1, round(1 / (max(f_eq, df) * step_s)))
     power = np.concatenate(([0.0], np.cumsum(analytic.real**2 + analytic.imag**2)))
@@ -286,7 +293,7 @@ def _motion(target: Floats, measured: Floats, tracking: Tracking, trusted: Track
     low, high = np.maximum(index - period // 2, 0), np.minimum(index + period // 2 + 1, m)
     amplitude = np.sqrt(np.maximum(power[high] - power[low], 0.0) / (high - low))
     margin = min(_ENDS / (df * top), 0.08 * n / rate_hz)
-    time_s = index * step_s
+    time_s = np.asarray(index * step_s, dtype=np.float64)
     inside = (time_s >= margin + max(delay_s, 0)) & (time_s <= (n - 1) / rate_hz - margin + min(delay_s, 0))
     if inside.sum() < _FEWEST_SAMPLES or top * n < _FEWEST_PERIODS * size:
         return None
@@ -423,11 +430,9 @@ def _level(motion: _Motion, rows: NDArray[np.bool_], where: Interval) -> Level:
 
 def _known(fit: _Fit, where: Interval, gain: float, by_gain: Floats, delay: float, by_delay: Floats) -> Level:
     """A level with the intervals of gain and delay, as sums of the coefficients."""
-    from scipy import special
-
     if not fit.known:
         return Level(where, delay, NO_INTERVAL, gain, NO_INTERVAL)
-    t = float(special.stdtrit(fit.free, 0.975))
+    t = t_975(fit.free)
     gain_half, delay_half = t * fit.std(by_gain), t * fit.std(by_delay)
     return Level(where, delay, (delay - delay_half, delay + delay_half), gain, (gain - gain_half, gain + gain_half))
 
@@ -606,8 +611,6 @@ def _told(
     response: FrequencyResponse | None,
 ) -> tuple[Dependence, list[tuple[Level, Level]]]:
     """The figures of one cause, and pairs of levels, any of which may show that it matters."""
-    from scipy import special
-
     start, end = float(motion.time_s[0]), float(motion.time_s[-1])
     fit = fits[name]
     if name == "frequency":
@@ -632,7 +635,7 @@ def _told(
         )
         rate = 2e6 / (end - start)
         ppm, std = rate * float(clock.coefficients[2]), rate * clock.std(np.array((0.0, 0.0, 1.0)))
-        t = float(special.stdtrit(max(clock.free, 2), 0.975))
+        t = t_975(max(clock.free, 2))
         interval = (ppm - t * std, ppm + t * std)
         return _found("clock", shares, "line", levels, clock_ppm=ppm, clock_ppm_interval=interval), [levels]
     levels = (_along(motion, fit, (-1.0,), (start, start)), _along(motion, fit, (1.0,), (end, end)))
