@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-import rthstrack._core as _core
+from rthstrack._core import KeyFrequencies as CoreKeyFrequencies
+from rthstrack._core import choose_factors as core_choose_factors
+from rthstrack._core import prior_bounds as core_prior_bounds
 from rthstrack.errors import SettingError, SignalError
 from rthstrack.evaluation.inputs import _count, _number, _samples, _single
 from rthstrack.evaluation.results import _Result
@@ -162,7 +164,7 @@ def choose_factors(
     allowed = _number("tolerance", tolerance)
     reference = dataclasses.replace(base, data_decimation=p or 1, frequency_decimation=q or 1)
     chosen_p, chosen_q, amplitude_bound, delay_bound, measure, numbers, changes = _choice(
-        _core.choose_factors(plan, t, m, allowed, p, q)
+        core_choose_factors(plan, t, m, allowed, p, q)
     )
     found = Factors(
         chosen_p,
@@ -221,7 +223,7 @@ def _windowed(
             continue
         plan = _plan(len(target), rate_hz, settings)
         try:
-            choice = _core.choose_factors(plan, target, measured, found.tolerance, data_decimation, None)
+            choice = core_choose_factors(plan, target, measured, found.tolerance, data_decimation, None)
         except SignalError:
             continue  # nothing is left to judge by
         p, q, amplitude_bound, delay_bound, measure, _, _ = _choice(choice)
@@ -251,7 +253,7 @@ def prior_bounds(
     """
     t, m = _single(target, measured)
     plan = _plan(len(t), _number("rate_hz", rate_hz), _settings(settings))
-    over_p, over_q, near_zero = _core.prior_bounds(plan, t, m)
+    over_p, over_q, near_zero = core_prior_bounds(plan, t, m)
     measure: Literal["relative", "phase"] = "phase" if near_zero else "relative"
     return FactorChanges(*over_p, measure), FactorChanges(*over_q, measure)
 
@@ -274,7 +276,7 @@ class KeyFrequencies(_Result):
     rate_hz: float
     n_samples: int
     settings: Settings
-    _plan: _core.KeyFrequencies = field(repr=False)
+    _plan: CoreKeyFrequencies = field(repr=False)
 
     def evaluate(self, target: ArrayLike, measured: ArrayLike) -> Tracking:
         """Amplitude and delay over these bins alone: Eqs 6-12 with all other weights at zero.
@@ -318,7 +320,7 @@ def key_frequencies(target: ArrayLike, rate_hz: float, share: float = SHARE, **s
         raise SignalError(f"one actuator at a time is taken here: pass one column, not an array of shape {t.shape}")
     checked = _settings(settings, factors=True)
     rate, wanted = _number("rate_hz", rate_hz), _number("share", share)
-    plan = _core.KeyFrequencies(t, rate, wanted, checked)
+    plan = CoreKeyFrequencies(t, rate, wanted, checked)
     return KeyFrequencies(
         plan.frequency_hz, wanted, plan.share_held, plan.direct, plan.delta_f_hz, rate, len(t), checked, plan
     )

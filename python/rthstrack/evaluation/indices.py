@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import rthstrack._core as _core
+from rthstrack._core import index_histories as core_index_histories
+from rthstrack._core import indices as core_indices
 from rthstrack.evaluation.inputs import _number, _samples, _single
 from rthstrack.evaluation.results import _Result
 
@@ -76,7 +77,7 @@ def indices(
     """
     t, m = _single(target, measured)
     f = None if force is None else _samples("force", force)
-    return Indices(*_core.indices(t, m, _number("rate_hz", rate_hz), f, _number("max_lag_s", max_lag_s)))
+    return Indices(*core_indices(t, m, _number("rate_hz", rate_hz), f, _number("max_lag_s", max_lag_s)))
 
 
 def index_histories(
@@ -92,4 +93,4 @@ def index_histories(
     t, m = _single(target, measured)
     rate_hz = _number("rate_hz", rate_hz)
     f = None if force is None else _samples("force", force)
-    return IndexHistories(*_core.index_histories(t, m, rate_hz, f), rate_hz)
+    return IndexHistories(*core_index_histories(t, m, rate_hz, f), rate_hz)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import rthstrack._core as _core
+from rthstrack._core import Monitor as CoreMonitor
+from rthstrack._core import causal_decimate as core_causal_decimate
 from rthstrack.errors import SettingError, SignalError
 from rthstrack.evaluation.inputs import _band, _count, _number, _samples
 from rthstrack.evaluation.results import _ends, _Result
@@ -134,7 +135,7 @@ class Monitor:
             _number("minimum_amplitude", minimum_amplitude),
             _count("n_actuators", n_actuators),
         )
-        self._stream = _core.Monitor(self.settings)
+        self._stream = CoreMonitor(self.settings)
 
     @property
     def update_hz(self) -> float:
@@ -200,4 +201,4 @@ def causal_decimate(samples: ArrayLike, data_decimation: int) -> tuple[NDArray[n
     x = _samples("samples", samples)
     if x.ndim != 1:
         raise SignalError(f"samples must have the shape (n_samples,), not {x.shape}")
-    return _core.causal_decimate(x, _count("data_decimation", data_decimation))
+    return core_causal_decimate(x, _count("data_decimation", data_decimation))

@@ -6,7 +6,8 @@ import dataclasses
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import rthstrack._core as _core
+from rthstrack._core import frequency_response as core_frequency_response
+from rthstrack._core import frequency_slopes as core_frequency_slopes
 from rthstrack.evaluation.inputs import _band, _number, _single
 from rthstrack.evaluation.results import _Result
 
@@ -154,7 +155,7 @@ def frequency_response(
     segment = None if segment_s is None else _number("segment_s", segment_s)
     share, given_s = _number("overlap", overlap), None if align_s is None else _number("align_s", align_s)
     settings = (segment, share, window, detrend, given_s, bool(dispersion))
-    curves, uncertainty, n_segments, length_s, used_s, why = _core.frequency_response(t, m, rate_hz, settings)
+    curves, uncertainty, n_segments, length_s, used_s, why = core_frequency_response(t, m, rate_hz, settings)
     about: Any = (length_s, share, n_segments, window, detrend, used_s, bool(dispersion), rate_hz, why)
     return FrequencyResponse(*curves, *uncertainty, *about)
 
@@ -197,7 +198,7 @@ def frequency_slopes(
     share = _number("overlap", overlap)
     start_s = 0.0 if align_s is None else _number("align_s", align_s)
     settings = (segment, share, window, detrend, start_s, False)
-    f_eq, gain, delay, band, n_bins, found_s, dispersion, n_segments, length_s = _core.frequency_slopes(
+    f_eq, gain, delay, band, n_bins, found_s, dispersion, n_segments, length_s = core_frequency_slopes(
         t, m, rate_hz, _band(band_hz), align_s is not None, settings
     )
     return FrequencySlopes(

@@ -15,7 +15,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-import rthstrack._core as _core
+from rthstrack._core import Evaluator as CoreEvaluator
+from rthstrack._core import bridged as core_bridged
+from rthstrack._core import evaluate_moving as core_evaluate_moving
 from rthstrack.errors import RthstrackError, SettingError, SignalError
 from rthstrack.evaluation.bad_samples import _bad_samples, bad_words
 from rthstrack.evaluation.inputs import _count, _number, _pair
@@ -137,18 +139,18 @@ class MovingTracking(_Result):
 
 #: Samples of all plans that are kept for the next call: with its buffers a plan takes some 50 to 250 bytes a sample.
 _MOST_PLANNED = 1 << 22
-_plans: OrderedDict[tuple[int, float, Settings], _core.Evaluator] = OrderedDict()
+_plans: OrderedDict[tuple[int, float, Settings], CoreEvaluator] = OrderedDict()
 _plans_lock = threading.Lock()
 
 
-def _plan(n_samples: int, rate_hz: float, settings: Settings) -> _core.Evaluator:
+def _plan(n_samples: int, rate_hz: float, settings: Settings) -> CoreEvaluator:
     """A plan of these, made anew unless it is among the latest."""
     key = (n_samples, rate_hz, settings)
     with _plans_lock:
         if key in _plans:
             _plans.move_to_end(key)
             return _plans[key]
-    made = _core.Evaluator(n_samples, rate_hz, settings)
+    made = CoreEvaluator(n_samples, rate_hz, settings)
     if n_samples <= _MOST_PLANNED:
         with _plans_lock:
             _plans[key] = made
@@ -272,7 +274,7 @@ def evaluate(
 
 
 def _tracking(
-    plan: _core.Evaluator,
+    plan: CoreEvaluator,
     settings: Settings,
     rate_hz: float,
     target: NDArray[np.float64],
@@ -374,7 +376,7 @@ def evaluate_moving(
     )._checked()
     rate_hz, window_s, hop_s = _number("rate_hz", rate_hz), _number("window_s", window_s), _number("hop_s", hop_s)
     ratio = _number("minimum_std_ratio", minimum_std_ratio)
-    found = _each_actuator(t, m, lambda x, y: _core.evaluate_moving(x, y, rate_hz, window_s, hop_s, ratio, settings))
+    found = _each_actuator(t, m, lambda x, y: core_evaluate_moving(x, y, rate_hz, window_s, hop_s, ratio, settings))
     time_s = found[0][0][0]
     averaged: Any
     reasons: Any
@@ -400,7 +402,7 @@ def bridged(
 
     What is left at the good samples beside them is carried over in a straight line, so that they speak for no cause.
     """
-    found = _core.bridged(target, measured, rate_hz, trusted.settings)
+    found = core_bridged(target, measured, rate_hz, trusted.settings)
     if found is None:
         return target, measured
     (target, measured), gaps = found

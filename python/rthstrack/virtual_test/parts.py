@@ -15,7 +15,10 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-import rthstrack._core as _core
+from rthstrack._core import check_test as core_check_test
+from rthstrack._core import from_matrices as core_from_matrices
+from rthstrack._core import sdof as core_sdof
+from rthstrack._core import shear_building as core_shear_building
 from rthstrack.errors import ConfigurationError, SettingError
 
 if TYPE_CHECKING:
@@ -141,7 +144,7 @@ class Structure:
     @classmethod
     def sdof(cls, frequency_hz: float, damping_ratio: float, mass_kg: float = 1000.0) -> Structure:
         """One degree of freedom: k = m (2 pi f)^2, c = 2 zeta m (2 pi f). Raises ConfigurationError."""
-        found = _core.sdof(float(frequency_hz), float(damping_ratio), float(mass_kg))
+        found = core_sdof(float(frequency_hz), float(damping_ratio), float(mass_kg))
         table: dict[str, object] = {"frequency_hz": frequency_hz, "damping_ratio": damping_ratio, "mass_kg": mass_kg}
         return cls._built(found, np.ones(1), table)
 
@@ -156,7 +159,7 @@ class Structure:
         masses = [float(m) for m in storey_masses_kg]
         stiffnesses = [float(k) for k in storey_stiffnesses_n_per_m]
         table = {"storey_masses_kg": masses, "storey_stiffnesses_n_per_m": stiffnesses, **_damping_table(damping)}
-        return cls._built(_core.shear_building(masses, stiffnesses, damping), np.ones(len(masses)), table)
+        return cls._built(core_shear_building(masses, stiffnesses, damping), np.ones(len(masses)), table)
 
     @classmethod
     def from_matrices(
@@ -177,7 +180,7 @@ class Structure:
         table |= {"damping_n_s_per_m": damped.tolist()} if isinstance(damped, np.ndarray) else _damping_table(damped)
         if influence is not None:
             table["influence"] = row.tolist()
-        return cls._built(_core.from_matrices(mass, stiffness, damped, row.tolist()), row, table)
+        return cls._built(core_from_matrices(mass, stiffness, damped, row.tolist()), row, table)
 
     @classmethod
     def _built(
@@ -317,7 +320,7 @@ class VirtualTest:
         told = {m.key.rpartition(".")[0] for m in mistakes if m.key.endswith("dof")}
         if self.stepping not in ("continuous", "cr"):
             mistakes.append(Mistake("test.stepping", f"expected 'continuous' or 'cr', found {self.stepping!r}"))
-        for key, message in _core.check_test(self._counted() if mistakes else self):
+        for key, message in core_check_test(self._counted() if mistakes else self):
             if not (key.endswith("dof") and key.rpartition(".")[0] in told) and key not in {m.key for m in mistakes}:
                 mistakes.append(Mistake(key, message))
         for i, actuator in enumerate(self.actuators, 1):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-import rthstrack._core as _core
+from rthstrack._core import VirtualTest as CoreVirtualTest
 from rthstrack.errors import ConfigurationError, SettingError, UnstableError
 from rthstrack.virtual_test.parts import _CONVERTERS, DelayHistory
 from rthstrack.virtual_test.run import CriticalDelay, Run
@@ -176,11 +176,11 @@ def true_tracking(
     return np.abs(response[at]).reshape(frequency.shape), delay.reshape(frequency.shape)
 
 
-def _plan(test: VirtualTest) -> _core.VirtualTest:
+def _plan(test: VirtualTest) -> CoreVirtualTest:
     mistakes = test.check()
     if mistakes:
         raise ConfigurationError("", [(m.key, m.message) for m in mistakes])
-    return _core.VirtualTest(test)
+    return CoreVirtualTest(test)
 
 
 def _noise(test: VirtualTest, n_samples: int) -> list[list[float] | None]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-import rthstrack._core as _core
+from rthstrack._core import read_text as core_read_text
 from rthstrack.errors import RecordingError
 from rthstrack.recording.readers.arrays import tidy
 from rthstrack.recording.readers.contents import Clock, Contents, RateStatement, Series
@@ -55,7 +55,7 @@ def _statement(key: str, units: Iterable[str], mark: str) -> re.Pattern[str]:
 def read(path: Path) -> Contents:
     """Reads a text file: comma, semicolon, tab, bar or blanks between columns, with any preamble."""
     try:
-        table = _core.read_text(path.read_bytes())
+        table = core_read_text(path.read_bytes())
     except ValueError as error:
         raise RecordingError(str(error)) from None
     series: list[Series] = []
