@@ -9,7 +9,6 @@ import json
 import math
 import os
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -281,6 +280,8 @@ def _evaluate_all(args: argparse.Namespace) -> tuple[list[list[Assessment]], lis
     if len(files) == 1:
         found: Iterable[list[Assessment] | str] = [one(files[0])]
     else:
+        from concurrent.futures import ThreadPoolExecutor
+
         with ThreadPoolExecutor(max_workers=min(len(files), os.cpu_count() or 1)) as pool:
             found = list(_with_progress(pool.map(one, files), len(files)))
     results, failures = [], []
