@@ -36,6 +36,9 @@ class Mistake(NamedTuple):
     message: str
 
 
+# Restoring forces -----------------------------------------------------------------------------------------------------
+
+
 @dataclass(frozen=True, slots=True)
 class Spring:
     """r = k x. `stiffness_n_per_m` None: all the stiffness that the structure has at this place."""
@@ -97,6 +100,9 @@ class BaberWen:
 
 
 Law = Spring | Dashpot | KelvinVoigt | Maxwell | BoucWen | BaberWen
+
+
+# Damping and structure ------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,6 +212,9 @@ class Element:
     dof: int = 1
     from_dof: int = 0
     part_of_structure: bool = True
+
+
+# Actuator, compensation, converters -----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
