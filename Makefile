@@ -43,7 +43,7 @@ demo-live: .venv/built ## a test sent at its own pace, watched by the monitor: t
 test: lint test-rust test-stubs test-doctests test-examples test-python ## every check; what continuous integration runs
 
 .PHONY: lint
-lint: .venv/ready toolchain ## formatting, lints and types of Rust and Python
+lint: .venv/ready toolchain ## formatting, lints and types of Rust and Python; which room imports which
 	$(call say,format and lints: Rust)
 	@cargo fmt --all --check
 	@cargo clippy --workspace --all-targets --locked --quiet -- -D warnings
@@ -52,6 +52,8 @@ lint: .venv/ready toolchain ## formatting, lints and types of Rust and Python
 	@$(BIN)/ruff format --check
 	@$(BIN)/mypy -p rthstrack
 	@$(BIN)/mypy --strict reference/*.py
+	$(call say,rooms of the Python package)
+	@PYTHONPATH=python $(BIN)/lint-imports --no-logo --no-cache
 
 .PHONY: test-rust
 test-rust: .venv/ready toolchain ## Rust tests and doctests

@@ -365,7 +365,7 @@ def short_windows(run: Run) -> None:
 
 
 def _windows_figure(run: Run, pair: Pair, time_s: Floats, errors: dict[str, Floats]) -> None:
-    with plots._style():
+    with plots.style._style():
         page = Figure(figsize=(plots.DOUBLE_COLUMN_IN, 2.6), layout="constrained")
         ax = page.add_subplot()
         shown = (
@@ -379,7 +379,7 @@ def _windows_figure(run: Run, pair: Pair, time_s: Floats, errors: dict[str, Floa
         ax.axhline(1.0, color=plots.MUTED, linewidth=0.6, linestyle=(0, (5, 3)))
         ax.set_xlabel("Centre of the window (s)")
         ax.set_ylabel("Delay error (%)")
-        plots._legend(ax, columns=4)
+        plots.style._legend(ax, columns=4)
         run.save(page, "windows", f"Delay error in 4 s windows, {pair.name}, at least 1e-4 %; dashed: 1 %")
 
 
@@ -503,7 +503,7 @@ def _noise_table(run: Run, errors: Floats, bias: Floats, std: Floats, limits: Fl
 def _noise_figure(run: Run, pair: Pair, errors: Floats, limit: float) -> None:
     names = [*OURS, *generic_delay.ESTIMATORS]
     rms = 1e6 * np.sqrt(np.nanmean(errors**2, axis=0))
-    with plots._style():
+    with plots.style._style():
         page = Figure(figsize=(plots.DOUBLE_COLUMN_IN, 2.8), layout="constrained")
         ax = page.add_subplot()
         colours = [plots.VALUE] * len(OURS) + [plots.DOUBTFUL] * len(generic_delay.ESTIMATORS)
@@ -604,7 +604,7 @@ def _intervals(run: Run, pair: Pair, coefficient: float, seed: int) -> Floats:
 
 def _coverage_figure(run: Run, shown: dict[tuple[str, float], list[Floats]]) -> None:
     colours = (plots.VALUE, plots.SECOND, plots.THIRD, plots.MEASURED)
-    with plots._style():
+    with plots.style._style():
         page = Figure(figsize=(plots.DOUBLE_COLUMN_IN, 2.6), layout="constrained")
         axes = page.subplots(1, 3, sharey=True)
         for ax, coefficient in zip(axes, (0.0, 0.9, 0.99), strict=True):
@@ -777,7 +777,7 @@ def _moving_enough(pair: Pair, hop_s: float) -> NDArray[np.bool_]:
 
 
 def _delays_figure(run: Run, delays: Floats, curves: dict[tuple[str, str], Floats]) -> None:
-    with plots._style():
+    with plots.style._style():
         page = Figure(figsize=(plots.DOUBLE_COLUMN_IN, 2.4), layout="constrained")
         axes = page.subplots(1, 2, sharey=True)
         for ax, kind in zip(axes, dict.fromkeys(kind for kind, _ in curves), strict=True):
@@ -786,7 +786,7 @@ def _delays_figure(run: Run, delays: Floats, curves: dict[tuple[str, str], Float
                 ax.semilogy(1e3 * delays, size, ".-", color=colour, ms=3, label=name.strip("`"))
             ax.set_xlabel(f"Delay (ms), {kind}")
         axes[0].set_ylabel("Delay error (µs)")
-        plots._legend(axes[1], columns=3)
+        plots.style._legend(axes[1], columns=3)
         run.save(page, "delays", "Delay error over the delay, whole records, at least 1e-3 us")
 
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from rthstrack import Evaluator, choose_factors, key_frequencies
 from rthstrack.errors import SettingError, SignalError
-from rthstrack.factors import prior_bounds
+from rthstrack.evaluation.factors import prior_bounds
 from rthstrack.ground_motion import list_records, record
 from rthstrack.recording import read_recording
 from rthstrack.virtual_test import Actuator, BoucWen, Run, Spring, Structure, VirtualTest, simulate_many

@@ -70,6 +70,44 @@ def medians_us(calls: list[Callable[[], Any]], rounds: int) -> list[float]:
     return [statistics.median(found) for found in times]
 
 
+def start_ratios(rounds: int = 15) -> dict[str, float]:
+    """Medians of how much longer a start takes than the bare interpreter's, which runs in the same turn."""
+    example = str(ROOT / "examples" / "data" / "utfsm_chirp_0A.csv")
+    commands = {
+        "pass": ["-c", "pass"],
+        "numpy": ["-c", "import numpy"],
+        "--version": ["-m", "rthstrack", "--version"],
+        "--help": ["-m", "rthstrack", "--help"],
+        "evaluate --help": ["-m", "rthstrack", "evaluate", "--help"],
+        "evaluate": ["-m", "rthstrack", "evaluate", example],
+    }
+    seconds: dict[str, list[float]] = {name: [] for name in commands}
+    for _ in range(rounds):
+        for name, arguments in commands.items():
+            start = time.perf_counter()
+            subprocess.run([sys.executable, *arguments], check=True, stdout=subprocess.DEVNULL, cwd=ROOT)
+            seconds[name].append(time.perf_counter() - start)
+    return {
+        name: statistics.median(a / b for a, b in zip(found, seconds["pass"], strict=True))
+        for name, found in seconds.items()
+    }
+
+
+def start_figures(ratios: dict[str, float]) -> list[tuple[str, str, str, bool]]:
+    """How long the command takes to start; nothing is asked of what needs NumPy, which takes most of it."""
+    figures = [
+        (f"`rthstrack {name}` over `python -c pass`", "<= 5", f"{ratios[name]:.1f}", ratios[name] <= 5)
+        for name in ("--version", "--help")
+    ]
+    for name, what in (
+        ("numpy", "`python -c 'import numpy'`, the same (not asked for)"),
+        ("evaluate --help", "`rthstrack evaluate --help`, the same (not asked for)"),
+        ("evaluate", "`rthstrack evaluate` of a CSV of 1.8 MB, the same (not asked for)"),
+    ):
+        figures.append((what, "", f"{ratios[name]:.1f}", True))
+    return figures
+
+
 def rust_bench(name: str) -> dict[str, Any]:
     """One run of crates/core/benches/<name>.rs."""
     command = ["cargo", "bench", "--quiet", "--package", "rthstrack", "--bench", name]
@@ -316,6 +354,7 @@ def main() -> int:
         figures.append((what, f"<= {most:g}" if most else "", f"{value:.0f}", most is None or value <= most))
     lines += monitor_table(online)
     figures += monitor_figures(online)
+    figures += start_figures(start_ratios())
     gain = suite_s[1] / suite_s[2]
     figures.append(
         (

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rthstrack.assessment import Assessment, Limits, assess
+from rthstrack.verdict import Assessment, Limits, assess
 
 Signal = NDArray[np.float64]
 

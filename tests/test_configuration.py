@@ -14,7 +14,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rthstrack.configuration import configuration_from, read_configuration, to_table, virtual_test_from
 from rthstrack.errors import ConfigurationError, SettingError
 from rthstrack.virtual_test import (
     Actuator,
@@ -34,6 +33,7 @@ from rthstrack.virtual_test import (
     TransferFunction,
     VirtualTest,
 )
+from rthstrack.virtual_test.configuration import configuration_from, read_configuration, to_table, virtual_test_from
 from tolerances import round_off
 
 PLAIN = """

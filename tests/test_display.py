@@ -7,8 +7,9 @@ import itertools
 import numpy as np
 import pytest
 
-from rthstrack import display
-from rthstrack.tracking import Settings, Tracking
+from rthstrack.evaluation.settings import Settings
+from rthstrack.evaluation.tracking import Tracking
+from rthstrack.verdict import display
 
 
 @pytest.mark.parametrize(

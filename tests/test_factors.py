@@ -15,7 +15,7 @@ import pytest
 from rthstrack import assess, choose_factors, evaluate, evaluate_moving, key_frequencies
 from rthstrack.cli import main
 from rthstrack.errors import SettingError, SignalError
-from rthstrack.factors import prior_bounds
+from rthstrack.evaluation.factors import prior_bounds
 from rthstrack.studies import Pair, Study, study
 from tolerances import physical, round_off
 

@@ -45,7 +45,7 @@ from live_monitor import (
 )
 from rthstrack import _core, read_recording
 from rthstrack.cli import main
-from rthstrack.readers.arrow import END_OF_STREAM
+from rthstrack.recording.readers.arrow import END_OF_STREAM
 
 pytestmark = [
     pytest.mark.skipif(not hasattr(_core, "Live"), reason="this build has no rthstrack._core.Live"),

@@ -21,8 +21,8 @@ from rthstrack._core import __version__
 from rthstrack.cli import main
 from rthstrack.errors import RecordingError
 from rthstrack.live.log import Log, readings_path
-from rthstrack.readers.arrow import END_OF_STREAM
 from rthstrack.recording import propose_pair, read_recording
+from rthstrack.recording.readers.arrow import END_OF_STREAM
 
 RATE = 2000.0
 # More processes killed with RTHSTRACK_KILLS=200, say.

@@ -22,7 +22,7 @@ from fake_live import FakeLive
 from rthstrack import _core
 from rthstrack.cli import addresses, main
 from rthstrack.errors import SettingError
-from rthstrack.readers.arrow import END_OF_STREAM
+from rthstrack.recording.readers.arrow import END_OF_STREAM
 
 FAKE = Path(__file__).with_name("fake_live.py")
 UDP = ("--listen", "udp://127.0.0.1:0", "--rate", "1024")

@@ -19,8 +19,8 @@ from matplotlib.figure import Figure
 
 import assessments as examples
 from rthstrack import plots
-from rthstrack.assessment import Assessment, Limits
 from rthstrack.errors import SettingError
+from rthstrack.verdict import Assessment, Limits
 
 ONE = (plots.plot_time_history, plots.plot_error, plots.plot_loop, plots.plot_spectra)
 SEVERAL = ((plots.plot_frequency_response, 3), (plots.plot_moving, 2), (plots.plot_indices, 2))

@@ -378,7 +378,7 @@ def test_evaluating_does_not_touch_the_callers_arrays() -> None:
 
 
 def test_the_latest_plans_are_kept_up_to_so_many_samples(monkeypatch: pytest.MonkeyPatch) -> None:
-    from rthstrack import tracking
+    from rthstrack.evaluation import tracking
 
     monkeypatch.setattr(tracking, "_MOST_PLANNED", 1000)
     monkeypatch.setattr(tracking, "_plans", type(tracking._plans)())

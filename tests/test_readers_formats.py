@@ -17,8 +17,8 @@ import scipy.io
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 
 from rthstrack.errors import RecordingError
-from rthstrack.readers import mat
 from rthstrack.recording import Recording, propose_pair, read_recording
+from rthstrack.recording.readers import mat
 
 if TYPE_CHECKING:
     from pathlib import Path

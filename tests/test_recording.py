@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rthstrack.errors import ChannelError, RecordingError, SettingError
-from rthstrack.readers.stamps import Irregular, Uniform, examine
 from rthstrack.recording import Channel, Recording, length_factor, propose_pair, read_recording
+from rthstrack.recording.readers.stamps import Irregular, Uniform, examine
 from tolerances import round_off
 
 if TYPE_CHECKING:

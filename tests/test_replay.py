@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from rthstrack.cli import main
-from rthstrack.run_file import write_run
+from rthstrack.virtual_test.run import write_run
 from test_simulate_command import a_run
 
 RATE = 500.0

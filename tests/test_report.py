@@ -19,9 +19,9 @@ import pytest
 from playwright.sync_api import Browser, Page, sync_playwright
 
 import assessments as examples
-from rthstrack.assessment import Assessment, Limits
 from rthstrack.errors import SettingError
 from rthstrack.report import report_html, write_report
+from rthstrack.verdict import Assessment, Limits
 
 FLAGS = [
     "--no-sandbox",

@@ -20,6 +20,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from rthstrack.cli import main
 from rthstrack.errors import RecordingError, SettingError
+from rthstrack.evaluation.tracking import evaluate
 from rthstrack.ground_motion import GroundMotion, list_records, record
 from rthstrack.reproduction import (
     CHEBYSHEV,
@@ -52,7 +53,6 @@ from rthstrack.reproduction.claims.experiment import fitted_alpha, residual_dela
 from rthstrack.reproduction.far_field import OWN_FILTER, Component
 from rthstrack.reproduction.paper_form import Timing
 from rthstrack.reproduction.time_model import time_model
-from rthstrack.tracking import evaluate
 from rthstrack.virtual_test import true_tracking
 from tolerances import physical, round_off
 

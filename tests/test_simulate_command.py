@@ -18,12 +18,9 @@ import pytest
 
 import rthstrack
 from rthstrack.cli import main
-from rthstrack.configuration import read_configuration
 from rthstrack.errors import RecordingError, SignalError, UnstableError
 from rthstrack.ground_motion import ground_motion_from, synthetic_ground_motion
 from rthstrack.recording import propose_pair, read_recording
-from rthstrack.run_file import read_run_test, write_run
-from rthstrack.target_motion import SineTarget, SweepTarget
 from rthstrack.virtual_test import (
     Actuator,
     Converter,
@@ -42,6 +39,9 @@ from rthstrack.virtual_test import (
     VirtualTest,
     simulate,
 )
+from rthstrack.virtual_test.configuration import read_configuration
+from rthstrack.virtual_test.run import read_run_test, write_run
+from rthstrack.virtual_test.target_motion import SineTarget, SweepTarget
 from tolerances import physical
 
 LINEAR = """

@@ -17,10 +17,11 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from rthstrack import plots, study_plots
+from rthstrack import plots
 from rthstrack.errors import RecordingError, SettingError, SignalError
+from rthstrack.evaluation.settings import Settings
+from rthstrack.plots import study as study_plots
 from rthstrack.studies import Cell, Pair, StudiedSource, Study, StudySettings, read_pairs, study
-from rthstrack.tracking import Settings
 from tolerances import physical, round_off
 
 RATE = 200.0
@@ -283,7 +284,7 @@ def test_a_recorded_file_is_studied_by_its_channels(tmp_path: Path) -> None:
 
 
 def test_times_are_measured_serially_when_all_numbers_are_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    module = sys.modules["rthstrack.studies"]
+    module = sys.modules["rthstrack.studies.grid"]
     happened: list[tuple[str, bool]] = []
     evaluated, timed = module._evaluated, module._computing_time_s
     main = threading.get_ident()

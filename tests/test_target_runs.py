@@ -23,10 +23,7 @@ import dynamics_twin as twin
 import rthstrack
 from loops import servo_response, smooth_motion
 from rthstrack.cli import main
-from rthstrack.configuration import configuration_from, read_configuration, to_table, virtual_test_from
 from rthstrack.errors import ChannelError, ConfigurationError, RecordingError, SettingError, UnstableError
-from rthstrack.run_file import read_run_test
-from rthstrack.target_motion import RecordedTarget, SineTarget, SweepTarget, read_target, target_from
 from rthstrack.virtual_test import (
     Actuator,
     BoucWen,
@@ -48,6 +45,9 @@ from rthstrack.virtual_test import (
     simulate_many,
     true_tracking,
 )
+from rthstrack.virtual_test.configuration import configuration_from, read_configuration, to_table, virtual_test_from
+from rthstrack.virtual_test.run import read_run_test
+from rthstrack.virtual_test.target_motion import RecordedTarget, SineTarget, SweepTarget, read_target, target_from
 from tolerances import physical, round_off
 
 RATE = 1024.0

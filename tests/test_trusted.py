@@ -485,7 +485,7 @@ def test_the_text_shows_both_estimates_side_by_side(capsys: pytest.CaptureFixtur
 def test_half_the_interval_decides_how_many_digits_are_written(
     value: float, interval: tuple[float, float], text: str
 ) -> None:
-    assert rthstrack.display.with_interval(value, interval) == text
+    assert rthstrack.verdict.display.with_interval(value, interval) == text
 
 
 def test_the_figure_shows_both_estimates_with_a_band() -> None:
@@ -513,7 +513,7 @@ def test_windows_without_numbers_are_counted_by_their_kind_of_reason() -> None:
     measured = np.where(T < 22, burst(0.01), 3 * broad(seed=9)) + noise(0.05)
     moving = assessed(burst(), measured).trusted_moving
     assert moving is not None
-    counted = rthstrack.display.reasons(moving)
+    counted = rthstrack.verdict.display.reasons(moving)
     assert sum(n for n, _ in counted) == sum(bool(reason) for reason in moving.reason)
     assert [n for n, _ in counted] == sorted((n for n, _ in counted), reverse=True)
     assert len(counted) == len({text.split("(")[0].rstrip("0123456789. ") for _, text in counted})

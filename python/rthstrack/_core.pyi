@@ -5,9 +5,8 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from rthstrack import virtual_test
-from rthstrack.monitor import MonitorSettings
-from rthstrack.tracking import Settings
+from rthstrack.evaluation.settings import MonitorSettings, Settings
+from rthstrack.virtual_test import parts as virtual_test
 
 __all__ = [
     "Evaluator",

@@ -6,7 +6,6 @@ import dataclasses
 import difflib
 import math
 import re
-import tomllib
 import typing
 from dataclasses import MISSING, dataclass
 from typing import TYPE_CHECKING, Any, Literal
@@ -22,6 +21,8 @@ if TYPE_CHECKING:
 
 def read_toml(file: Path) -> dict[str, Any]:
     """The tables of a TOML file. Raises ConfigurationError where it cannot be read as one."""
+    import tomllib
+
     try:
         return tomllib.loads(file.read_bytes().decode("utf-8"))
     except OSError as error:

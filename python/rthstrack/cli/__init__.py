@@ -1,14 +1,15 @@
-"""The command `rthstrack`: one file a subcommand, each with `add_parser` and `run`."""
+"""The command `rthstrack`: one file a command, each with `add_parser` and `run`; only the one asked for is loaded."""
 
 from __future__ import annotations
 
 import argparse
 import os
 import sys
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from rthstrack._core import __version__
-from rthstrack.cli import channels, evaluate, monitor, replay, reproduce, simulate, study
+from rthstrack.cli.commands import COMMANDS
 from rthstrack.errors import RthstrackError, SettingError
 
 if TYPE_CHECKING:
@@ -25,9 +26,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--version", action="version", version=f"rthstrack {__version__}")
     subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for command in (simulate, evaluate, channels, study, monitor, replay, reproduce):
-        command.add_parser(subparsers)
-    args = parser.parse_args(argv)
+    words = sys.argv[1:] if argv is None else argv
+    asked = next((word for word in words if not word.startswith("-")), None)
+    for name, line in COMMANDS.items():
+        if name == asked:
+            import_module(f"{__name__}.{name}").add_parser(subparsers)
+        else:
+            subparsers.add_parser(name, help=line)
+    args = parser.parse_args(words)
     try:
         status: int = args.run(args)
         sys.stdout.flush()

@@ -5,14 +5,13 @@ from __future__ import annotations
 import argparse
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from rthstrack.presets import PRESETS
-from rthstrack.tracking import Settings
+from rthstrack.evaluation.presets import PRESETS
+from rthstrack.evaluation.settings import Settings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
-    from typing import Any
 
 ESTIMATORS = ("fei", "aligned", "least_squares")
 

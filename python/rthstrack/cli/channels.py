@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rthstrack.cli.commands import COMMANDS
 from rthstrack.errors import ChannelError, RecordingError
-from rthstrack.readers import read_contents
-from rthstrack.recording import Recording, propose_pair, recording_from
+from rthstrack.recording.pairing import propose_pair
+from rthstrack.recording.readers import read_contents
+from rthstrack.recording.reading import recording_from
+from rthstrack.recording.recording import Recording
 
 if TYPE_CHECKING:
     import argparse
@@ -21,7 +24,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Adds the command to the command line."""
     parser = subparsers.add_parser(
         "channels",
-        help="list what is in a file: channels, units, sampling rate, likely target and measured",
+        help=COMMANDS["channels"],
         description="Lists the channels of recorded files (text, MATLAB, HDF5, TDMS, Parquet, Arrow, NumPy), their "
         "units, ranges and missing samples, the sampling rate and where it comes from, and the likely "
         "target/measured pair. Exit status: 0 all files were read, 1 some file could not be read, 2 misuse.",

@@ -9,12 +9,9 @@ import json
 import math
 import os
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rthstrack import display
-from rthstrack.assessment import Assessment, Limits, assess, json_ready, result_entry, without_trusted
 from rthstrack.cli.arguments import (
     NOT_GIVEN,
     add_method,
@@ -27,12 +24,21 @@ from rthstrack.cli.arguments import (
     tolerance,
     weight_power,
 )
-from rthstrack.display import with_interval
+from rthstrack.cli.commands import COMMANDS
 from rthstrack.errors import RecordingError, RthstrackError, SettingError, SignalError
-from rthstrack.factors import TOLERANCE
-from rthstrack.recording import Recording, propose_pair, read_recording
-from rthstrack.tracking import Evaluator, Settings
-from rthstrack.verdict import reason
+from rthstrack.evaluation.factors import TOLERANCE
+from rthstrack.evaluation.results import json_ready
+from rthstrack.evaluation.settings import Settings
+from rthstrack.evaluation.tracking import Evaluator
+from rthstrack.recording.pairing import propose_pair
+from rthstrack.recording.reading import read_recording
+from rthstrack.recording.recording import Recording
+from rthstrack.verdict import display
+from rthstrack.verdict.assessment import Assessment, assess, without_trusted
+from rthstrack.verdict.display import with_interval
+from rthstrack.verdict.entry import result_entry
+from rthstrack.verdict.limits import Limits
+from rthstrack.verdict.sentence import reason
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -40,7 +46,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from rthstrack.tracking import MovingTracking
+    from rthstrack.evaluation.tracking import MovingTracking
 
 FAILED, EXCEEDED = 1, 3
 _FIGURES = (".png", ".pdf", ".svg")
@@ -50,7 +56,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Adds the command to the command line."""
     parser = subparsers.add_parser(
         "evaluate",
-        help="judge how measured followed target in recorded tests",
+        help=COMMANDS["evaluate"],
         description="Judges how well the measured displacement followed the target, in amplitude and in time "
         "(Guo, Xu and Chen 2014). A positive delay means that measured lags. "
         "Exit status: 0 everything was evaluated, 1 some file failed, 2 misuse, 3 a limit was exceeded.",
@@ -274,6 +280,8 @@ def _evaluate_all(args: argparse.Namespace) -> tuple[list[list[Assessment]], lis
     if len(files) == 1:
         found: Iterable[list[Assessment] | str] = [one(files[0])]
     else:
+        from concurrent.futures import ThreadPoolExecutor
+
         with ThreadPoolExecutor(max_workers=min(len(files), os.cpu_count() or 1)) as pool:
             found = list(_with_progress(pool.map(one, files), len(files)))
     results, failures = [], []
@@ -302,12 +310,12 @@ def _write_outputs(args: argparse.Namespace, assessments: Sequence[Assessment]) 
     notes = []
     try:
         if args.report is not None:
-            from rthstrack.report import write_report
+            from rthstrack.report.page import write_report
 
             write_report(assessments, args.report)
             notes.append(f"report written to {args.report}")
         if args.figure is not None:
-            from rthstrack.plots import write_figure
+            from rthstrack.plots.assessment import write_figure
 
             for a, path in _figure_paths(args.figure, assessments):
                 write_figure(a, path)

@@ -9,8 +9,8 @@ import sys
 import time
 from typing import TYPE_CHECKING, Any
 
-from rthstrack import _core
 from rthstrack.cli import addresses
+from rthstrack.cli.commands import COMMANDS
 from rthstrack.cli.monitor_options import Plan, add_options, checked_plan
 from rthstrack.cli.running import Ended, say
 from rthstrack.errors import RthstrackError, SettingError
@@ -54,7 +54,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Adds the command to the command line."""
     parser = subparsers.add_parser(
         "monitor",
-        help="gain and delay while the test runs, with alarms, a log and a live page",
+        help=COMMANDS["monitor"],
         description=_DESCRIPTION,
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -66,10 +66,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace, wrong: Mapping[str, str]) -> int:
     """Monitors until the end of the input, of the duration or of the user's patience; returns the exit status."""
+    from rthstrack._core import Live
+
     plan = checked_plan(args, wrong)
     with Ended() as ended:
         try:
-            live = _core.Live(plan.monitor, plan.source, plan.alarms, plan.outputs)
+            live = Live(plan.monitor, plan.source, plan.alarms, plan.outputs)
         except OSError as error:
             raise RthstrackError(_line(error)) from None
         seen = _Seen(args)

@@ -20,9 +20,9 @@ from rthstrack.cli.arguments import (
     power_of_two,
 )
 from rthstrack.errors import ConfigurationError, SettingError
+from rthstrack.evaluation.monitor import largest_decimation
 from rthstrack.live import printable
 from rthstrack.live.layout import default_layout, layout_from, read_layout
-from rthstrack.monitor import largest_decimation
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

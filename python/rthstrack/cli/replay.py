@@ -13,10 +13,12 @@ import numpy as np
 
 from rthstrack.cli import addresses
 from rthstrack.cli.arguments import add_signals, count, positive
+from rthstrack.cli.commands import COMMANDS
 from rthstrack.cli.running import Ended, say
 from rthstrack.errors import RecordingError, RthstrackError, SettingError
 from rthstrack.live.layout import DatagramLayout, default_layout, read_layout
-from rthstrack.recording import propose_pair, read_recording
+from rthstrack.recording.pairing import propose_pair
+from rthstrack.recording.reading import read_recording
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -34,7 +36,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Adds the command to the command line."""
     parser = subparsers.add_parser(
         "replay",
-        help="send a recorded or virtual test as datagrams, at its own pace",
+        help=COMMANDS["replay"],
         description="Sends the samples of a recorded test, or of one that 'rthstrack simulate' wrote, as UDP datagrams "
         "at their own pace, so that 'rthstrack monitor' can be rehearsed: counter from 0, target and measured of each "
         "actuator, by default as little-endian doubles. Every sample has its place in time counted from the start, so "

@@ -12,16 +12,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rthstrack.cli.arguments import path, positive
-from rthstrack.configuration import read_configuration
+from rthstrack.cli.commands import COMMANDS
 from rthstrack.errors import ConfigurationError, SettingError
-from rthstrack.virtual_test import delay_damping, simulate, true_tracking
+from rthstrack.virtual_test.configuration import read_configuration
+from rthstrack.virtual_test.simulation import delay_damping, simulate, true_tracking
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import NDArray
 
-    from rthstrack.virtual_test import Run
+    from rthstrack.virtual_test.run import Run
 
 # Frequencies listed of a structure with many.
 _MOST_MODES = 6
@@ -31,7 +32,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Adds the command to the command line."""
     parser = subparsers.add_parser(
         "simulate",
-        help="run a virtual test: part of a structure computed, part a specimen behind an actuator that lags",
+        help=COMMANDS["simulate"],
         description="Runs the virtual test that a TOML file describes (structure, restoring forces, actuators with "
         "their delay and compensation, ground motion; or actuators alone along a sine, a sweep or a recorded target; "
         "see docs/virtual-tests.md and examples/*.toml), says which delay its loop bears and what a delay costs in "
@@ -69,7 +70,7 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
         raise ConfigurationError(args.config, mistakes) from None
     _print(finished, args.config)
     if args.output is not None:
-        from rthstrack.run_file import write_run
+        from rthstrack.virtual_test.run import write_run
 
         write_run(finished, args.output, motion=table)
         print(f"run written to {args.output}; judge it with: rthstrack evaluate {args.output}", file=sys.stderr)

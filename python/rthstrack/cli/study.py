@@ -13,7 +13,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rthstrack.assessment import json_ready
 from rthstrack.cli.arguments import (
     NOT_GIVEN,
     add_method,
@@ -25,20 +24,14 @@ from rthstrack.cli.arguments import (
     settle,
     tolerance,
 )
+from rthstrack.cli.commands import COMMANDS
 from rthstrack.errors import RthstrackError, SettingError
-from rthstrack.factors import TOLERANCE
-from rthstrack.studies import (
-    COMBINED,
-    POWERS,
-    WEIGHT_POWERS,
-    WINDOWS,
-    Pair,
-    Study,
-    StudySettings,
-    _several,
-    read_pairs,
-    study,
-)
+from rthstrack.evaluation.factors import TOLERANCE
+from rthstrack.evaluation.results import json_ready
+from rthstrack.studies.cells import Study
+from rthstrack.studies.grid import study
+from rthstrack.studies.pairs import Pair, read_pairs
+from rthstrack.studies.settings import COMBINED, POWERS, WEIGHT_POWERS, WINDOWS, StudySettings, _several
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -46,8 +39,8 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from rthstrack.studies import Cell
-    from rthstrack.tracking import Settings
+    from rthstrack.evaluation.settings import Settings
+    from rthstrack.studies.cells import Cell
 
 FAILED = 1
 _DESCRIPTION = """\
@@ -82,7 +75,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Adds the command to the command line."""
     parser = subparsers.add_parser(
         "study",
-        help="what data decimation P and frequency decimation Q do to amplitude, delay and computing time",
+        help=COMMANDS["study"],
         description=_DESCRIPTION,
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -300,7 +293,7 @@ def _write(found: Study, args: argparse.Namespace) -> list[str]:
     found.to_csv(path)
     notes = [f"cells written to {path}"]
     if not args.no_figures:
-        from rthstrack.study_plots import write_study_figures
+        from rthstrack.plots.study import write_study_figures
 
         figures = write_study_figures(found, args.output)
         notes.append(f"{len(figures)} figures written to {args.output}: {', '.join(p.name for p in figures)}")

@@ -31,7 +31,7 @@ import numpy as np
 import pyarrow as pa
 
 from rthstrack._core import __version__
-from rthstrack.readers.arrow import END_OF_STREAM, SAMPLE_LOG
+from rthstrack.recording.readers.arrow import END_OF_STREAM, SAMPLE_LOG
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

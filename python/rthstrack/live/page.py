@@ -6,10 +6,8 @@ that is slow, stalled or gone concerns its own thread alone.
 
 from __future__ import annotations
 
-import base64
 import contextlib
 import errno
-import hashlib
 import os
 import re
 import secrets
@@ -20,11 +18,11 @@ import time
 from collections.abc import Iterable, Iterator
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from importlib import resources
 from ipaddress import ip_address
 from socketserver import TCPServer
 from typing import Any, Protocol
 
+from rthstrack.assets import asset, digest
 from rthstrack.errors import SettingError
 
 #: Browsers that may watch at once.
@@ -336,23 +334,14 @@ class _Handler(BaseHTTPRequestHandler):
 
 def _content() -> tuple[bytes, str]:
     """The page, everything inside, and the policy that lets a browser run nothing else."""
-    style = "\n".join(map(_asset, _STYLES))
-    licence = f"/*! uPlot 1.6.32\n{_asset('uPlot.LICENSE').strip()}\n*/\n"
-    scripts = [(licence if name.startswith("uPlot") else "") + _asset(name) for name in _SCRIPTS]
-    page = _asset("live.html")
+    style = "\n".join(map(asset, _STYLES))
+    licence = f"/*! uPlot 1.6.32\n{asset('uPlot.LICENSE').strip()}\n*/\n"
+    scripts = [(licence if name.startswith("uPlot") else "") + asset(name) for name in _SCRIPTS]
+    page = asset("live.html")
     page = page.replace("<!-- style -->", f"<style>{style}</style>")
     page = page.replace("<!-- scripts -->", "".join(f"<script>{script}</script>" for script in scripts))
     policy = (
-        f"default-src 'none'; script-src {' '.join(map(_digest, scripts))}; style-src {_digest(style)}; "
+        f"default-src 'none'; script-src {' '.join(map(digest, scripts))}; style-src {digest(style)}; "
         "connect-src 'self'; img-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     )
     return page.encode(), policy
-
-
-def _asset(name: str) -> str:
-    return (resources.files("rthstrack") / "assets" / name).read_text(encoding="utf-8")
-
-
-def _digest(text: str) -> str:
-    """The text's hash as a content security policy names it."""
-    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"

@@ -10,25 +10,25 @@ from pathlib import Path
 from typing import Literal, TypeAlias
 
 from rthstrack.errors import SettingError, UnstableError
-from rthstrack.ground_motion import GroundMotion, read_ground_motion, record
+from rthstrack.ground_motion.files import read_ground_motion
+from rthstrack.ground_motion.motion import GroundMotion
+from rthstrack.ground_motion.records import record
 from rthstrack.reproduction import paper
-from rthstrack.virtual_test import (
+from rthstrack.virtual_test.parts import (
     Actuator,
     BaberWen,
     BoucWen,
-    CriticalDelay,
     Element,
     FirstOrder,
     InverseCompensation,
     KelvinVoigt,
     ModalDamping,
-    Run,
     Spring,
     Structure,
     VirtualTest,
-    critical_delay,
-    simulate,
 )
+from rthstrack.virtual_test.run import CriticalDelay, Run
+from rthstrack.virtual_test.simulation import critical_delay, simulate
 
 RecordFile: TypeAlias = str | Path | GroundMotion
 

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rthstrack.ground_motion import list_records, record
+from rthstrack.evaluation.indices import indices
+from rthstrack.ground_motion.records import list_records, record
 from rthstrack.reproduction import paper, paper_form
 from rthstrack.reproduction.cases import FITTED_ALPHA, UsedRecord, laboratory, linear, nonlinear, scaled_for_experiment
-from rthstrack.studies import study
-from rthstrack.tracking import indices
-from rthstrack.virtual_test import Run, simulate
+from rthstrack.studies.grid import study
+from rthstrack.virtual_test.run import Run
+from rthstrack.virtual_test.simulation import simulate
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -16,18 +16,19 @@ import matplotlib.ticker
 import numpy as np
 from matplotlib.figure import Figure
 
-from rthstrack import display
-from rthstrack.plots import DOUBLE_COLUMN_IN, MEASURED, MUTED, SECOND, TARGET, VALUE, _style
-from rthstrack.reproduction import CHEBYSHEV, HANN, LOWERED, ROUTES, SCIPY, SPECTRAL, TRANSFER, TUKEY, paper
+from rthstrack.plots.style import DOUBLE_COLUMN_IN, MEASURED, MUTED, SECOND, TARGET, VALUE, _style
+from rthstrack.reproduction import paper
 from rthstrack.reproduction.cases import CASES, Case
 from rthstrack.reproduction.claims.rows import component_seen, errors
+from rthstrack.reproduction.results import CHEBYSHEV, HANN, LOWERED, ROUTES, SCIPY, SPECTRAL, TRANSFER, TUKEY
 from rthstrack.reproduction.time_model import time_model
+from rthstrack.verdict import display
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from rthstrack.reproduction import Reproduction
+    from rthstrack.reproduction.results import Results
 
 #: A history is drawn by the extremes of so many groups of neighbouring samples.
 _GROUPS = 1500
@@ -87,7 +88,7 @@ class Plate:
     widths: tuple[float, ...] | None = None
 
 
-def plates(r: Reproduction) -> Iterator[Plate]:
+def plates(r: Results) -> Iterator[Plate]:
     """All figures in the paper's order, then those beside them."""
     for number, make in enumerate(FIGURES, start=1):
         yield make(r, f"figure-{number:02d}")
@@ -96,7 +97,7 @@ def plates(r: Reproduction) -> Iterator[Plate]:
             yield make(r, f"supplement-{number}")
 
 
-def histories(r: Reproduction, name: str, *, kind: str) -> Plate:
+def histories(r: Results, name: str, *, kind: str) -> Plate:
     """Figs 1, 4: displacement with the delay, and without delay and amplitude error."""
     panels = []
     for case in _cases(kind):
@@ -120,7 +121,7 @@ def histories(r: Reproduction, name: str, *, kind: str) -> Plate:
     return Plate(name, tuple(panels), 1, _remark(r, kind), 4.2)
 
 
-def experiment_histories(r: Reproduction, name: str) -> Plate:
+def experiment_histories(r: Results, name: str) -> Plate:
     """Fig 8: displacement of the frame in the virtual experiment, and measured less target."""
     panels = []
     for case in _cases("experiment"):
@@ -146,7 +147,7 @@ def experiment_histories(r: Reproduction, name: str) -> Plate:
     return Plate(name, tuple(panels), 2, _remark(r, "experiment"), 5.6)
 
 
-def tracking(r: Reproduction, name: str, *, kind: str, over: Literal["P", "Q"]) -> Plate:
+def tracking(r: Results, name: str, *, kind: str, over: Literal["P", "Q"]) -> Plate:
     """Figs 2, 5, 9 over P, Figs 11, 13, 15 over Q: A and d without a window and with; over P, MATLAB's decimate too."""
     routes: list[tuple[str, str, str, Any, bool]] = [
         (SPECTRAL, ", no window", "o", "-", False),
@@ -185,7 +186,7 @@ def tracking(r: Reproduction, name: str, *, kind: str, over: Literal["P", "Q"]) 
     return Plate(name, panels, 2, f"{_WINDOWS} {_remark(r, kind)}", 4.2)
 
 
-def times(r: Reproduction, name: str, *, kind: str, over: Literal["P", "Q"]) -> Plate:
+def times(r: Results, name: str, *, kind: str, over: Literal["P", "Q"]) -> Plate:
     """Figs 3, 6, 10 over P, Figs 12, 14, 16 over Q: computing time in ms, and as a share of that at P = Q = 1."""
     x = np.array(paper.POWERS, dtype=np.float64)
     absolute, shares = [], []
@@ -213,7 +214,7 @@ def times(r: Reproduction, name: str, *, kind: str, over: Literal["P", "Q"]) -> 
     return Plate(name, (*absolute, *shares), len(absolute), f"{remark} {_remark(r, kind)}", 5.0)
 
 
-def decimation_time(r: Reproduction, name: str) -> Plate:
+def decimation_time(r: Results, name: str) -> Plate:
     """Fig 7: the time that decimating both signals takes."""
     x = np.array(paper.POWERS, dtype=np.float64)
     series = tuple(
@@ -230,7 +231,7 @@ def decimation_time(r: Reproduction, name: str) -> Plate:
     return Plate(name, (panel,), 1, _remark_of(r, ["nonlinear-mu2035"]), 2.9)
 
 
-def combined(r: Reproduction, name: str, *, case: str) -> Plate:
+def combined(r: Results, name: str, *, case: str) -> Plate:
     """Figs 17-23: A and d over P, a curve for each Q; without a window, and with."""
     x = np.array(paper.TABLE_P, dtype=np.float64)
     of = CASES[case]
@@ -253,7 +254,7 @@ def combined(r: Reproduction, name: str, *, case: str) -> Plate:
     return Plate(name, tuple(panels), 2, f"{remark} {_remark_of(r, [case])}", 5.2)
 
 
-def decimation_filters(r: Reproduction, name: str) -> Plate:
+def decimation_filters(r: Results, name: str) -> Plate:
     """Beside the paper's: what three forms of the same Chebyshev filter make of P, linear structure, CHY101-N."""
     case, x = "linear-chy101-n", np.array(paper.POWERS, dtype=np.float64)
     routes = (
@@ -291,7 +292,7 @@ def decimation_filters(r: Reproduction, name: str) -> Plate:
     return Plate(name, panels, 2, _remark_of(r, [case]), 3.6)
 
 
-def printed_times(r: Reproduction, name: str) -> Plate:
+def printed_times(r: Results, name: str) -> Plate:
     """Beside the paper's: the printed times explained by five constants."""
     model = time_model()
     at = {n: [i for i, (case, _, _) in enumerate(model.keys) if _table_number(case) == n] for n in (1, 2, 3)}
@@ -319,7 +320,7 @@ def printed_times(r: Reproduction, name: str) -> Plate:
     return Plate(name, panels, 2, "n: points transformed; bins and samples of the pair.", 3.8)
 
 
-def distributions(r: Reproduction, name: str) -> Plate:
+def distributions(r: Results, name: str) -> Plate:
     """Beside the paper's: the largest errors of A and d over the 44 components of the far-field set."""
     panels = []
     for kind in ("linear", "nonlinear"):
@@ -342,7 +343,7 @@ def distributions(r: Reproduction, name: str) -> Plate:
     return Plate(name, tuple(panels), 3, "The 44 components of the far-field set of FEMA P695, whole.", 5.0)
 
 
-FIGURES: tuple[Callable[[Reproduction, str], Plate], ...] = (
+FIGURES: tuple[Callable[[Results, str], Plate], ...] = (
     partial(histories, kind="linear"),
     partial(tracking, kind="linear", over="P"),
     partial(times, kind="linear", over="P"),
@@ -367,7 +368,7 @@ FIGURES: tuple[Callable[[Reproduction, str], Plate], ...] = (
 )
 
 
-SUPPLEMENTS: tuple[Callable[[Reproduction, str], Plate], ...] = (decimation_filters, printed_times, distributions)
+SUPPLEMENTS: tuple[Callable[[Results, str], Plate], ...] = (decimation_filters, printed_times, distributions)
 
 
 # On paper -------------------------------------------------------------------------------------------------------------
@@ -481,7 +482,7 @@ def _factors(over: str, factor: int) -> tuple[int, int]:
     return (factor, 1) if over == "P" else (1, factor)
 
 
-def _over(r: Reproduction, route: str, case: str, over: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _over(r: Results, route: str, case: str, over: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """A, and d in ms, over P or Q from 1 to 512."""
     cells = [r.cell(route, case, *_factors(over, factor)) for factor in paper.POWERS]
     return np.array([c.amplitude for c in cells]), np.array([1e3 * c.delay_s for c in cells])
@@ -508,13 +509,13 @@ def _alpha(case: Case) -> str:
     return rf"$\alpha_{{es}}$ = {case.alpha_es}"
 
 
-def _record_name(r: Reproduction, case: Case) -> str:
+def _record_name(r: Results, case: Case) -> str:
     """The record that was used, and for which."""
     used = r.records[case.record]
     return f"{used.motion.name} for {case.record}" if used.remark else case.record
 
 
-def _curve_name(r: Reproduction, case: Case) -> str:
+def _curve_name(r: Results, case: Case) -> str:
     return _alpha(case) if case.alpha_es else _record_name(r, case)
 
 
@@ -526,9 +527,9 @@ def _kind_words(kind: str) -> str:
     return "virtual experiment" if kind == "experiment" else f"{kind} structure"
 
 
-def _remark(r: Reproduction, kind: str) -> str:
+def _remark(r: Results, kind: str) -> str:
     return _remark_of(r, [case.key for case in _cases(kind)])
 
 
-def _remark_of(r: Reproduction, keys: Sequence[str]) -> str:
+def _remark_of(r: Results, keys: Sequence[str]) -> str:
     return " ".join(dict.fromkeys(f"{r.remark(key)}." for key in keys if r.remark(key)))

@@ -9,12 +9,13 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
 
-from rthstrack.plots import DOUBLE_COLUMN_IN, MUTED, _style
-from rthstrack.reproduction import CHEBYSHEV, SCIPY, SPECTRAL, paper
+from rthstrack.plots.style import DOUBLE_COLUMN_IN, MUTED, _style
+from rthstrack.reproduction import paper
 from rthstrack.reproduction.cases import CASES
+from rthstrack.reproduction.results import CHEBYSHEV, SCIPY, SPECTRAL
 
 if TYPE_CHECKING:
-    from rthstrack.reproduction import Reproduction
+    from rthstrack.reproduction.results import Results
 
 #: The cases of each table; Table 3 was printed without Q = 1.
 TABLES = {
@@ -27,7 +28,7 @@ _WHERE = {"CANOGA": "Canoga Park"}
 _SHADES = LinearSegmentedColormap.from_list("share", ("#9ecae1", "#ffffff", "#fdae6b"))
 
 
-def rows(r: Reproduction, name: str) -> Iterator[tuple[str | float, ...]]:
+def rows(r: Results, name: str) -> Iterator[tuple[str | float, ...]]:
     """A row a case, P and Q, after a header: times in ms, and over that of the table's first cell."""
     routes = (SCIPY, SPECTRAL, CHEBYSHEV)
     header = [f"{what}_{unit}" for what in ("printed", *(route for route in routes)) for unit in ("ms", "ratio")]
@@ -46,7 +47,7 @@ def rows(r: Reproduction, name: str) -> Iterator[tuple[str | float, ...]]:
                 yield (key, CASES[key].record, used, P, Q, *cells)
 
 
-def draw(r: Reproduction, name: str) -> Figure:
+def draw(r: Results, name: str) -> Figure:
     """The table as a figure: times in ms, shaded by their share of the first cell, a row of tables a case."""
     keys = TABLES[name]
     with _style():

@@ -15,15 +15,15 @@ import scipy
 
 from rthstrack._core import __version__
 from rthstrack.errors import RecordingError, SettingError
-from rthstrack.plots import _style
+from rthstrack.plots.style import _style
 from rthstrack.reproduction import figures, paper, tables
-from rthstrack.reproduction.claims import MEANINGS, TERMS, WORDS, Claim
+from rthstrack.reproduction.claims import MEANINGS, TERMS, WORDS, Claim, judge
 from rthstrack.reproduction.far_field import WINDOWS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from rthstrack.reproduction import Reproduction
+    from rthstrack.reproduction.results import Results
 
 _CLAIM_COLUMNS = ("section", "statement", "printed", "ours", "verdict", "tolerance", "window", "why")
 
@@ -36,7 +36,7 @@ def prepare(out: Path) -> None:
         raise SettingError(f"{out}: cannot make this folder ({error.strerror}); name another") from None
 
 
-def write(r: Reproduction, out: Path, progress: Callable[[int, int], object]) -> None:
+def write(r: Results, out: Path, progress: Callable[[int, int], object]) -> None:
     """Writes everything. Files of the same names are overwritten, no others. Raises RecordingError."""
     total = len(figures.FIGURES) + len(figures.SUPPLEMENTS) + len(tables.TABLES) + 1
     try:
@@ -48,7 +48,7 @@ def write(r: Reproduction, out: Path, progress: Callable[[int, int], object]) ->
             _save(tables.draw(r, name), out / name)
             _write_csv(out / f"{name}.csv", tables.rows(r, name))
             progress(done, total)
-        claims = r.claims
+        claims = judge(r)
         _write_csv(
             out / "claims.csv", [_CLAIM_COLUMNS, *([getattr(c, name) for name in _CLAIM_COLUMNS] for c in claims)]
         )
@@ -58,7 +58,7 @@ def write(r: Reproduction, out: Path, progress: Callable[[int, int], object]) ->
         raise RecordingError(f"cannot write {error.filename}: {error.strerror}") from None
 
 
-def claims_text(r: Reproduction, claims: Sequence[Claim]) -> str:
+def claims_text(r: Results, claims: Sequence[Claim]) -> str:
     """The claims as Markdown: what was used, what words mean, and a table."""
     count = Counter(claim.verdict for claim in claims)
     lines = [

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rthstrack.reproduction import SCIPY, SPECTRAL, paper
+from rthstrack.reproduction import paper
 from rthstrack.reproduction.cases import CASES
 from rthstrack.reproduction.claims.frequency_decimation import RECORDS
 from rthstrack.reproduction.claims.rows import (
@@ -31,14 +31,15 @@ from rthstrack.reproduction.claims.rows import (
     timed,
     within,
 )
+from rthstrack.reproduction.results import SCIPY, SPECTRAL
 
 if TYPE_CHECKING:
-    from rthstrack.reproduction import Reproduction
+    from rthstrack.reproduction.results import Results
 
 _PAIRS = tuple(f"{kind}-{record.lower()}" for kind in ("linear", "nonlinear") for record in RECORDS)
 
 
-def simulations(r: Reproduction) -> Iterator[Claim]:
+def simulations(r: Results) -> Iterator[Claim]:
     """Section 5.1, Figs 17 to 20."""
     most = r.studies[SPECTRAL].settings.combined
     yield setting("5.1", "largest P and Q combined", "64 and 32", f"{most}", most == (64, 32))
@@ -97,7 +98,7 @@ def simulations(r: Reproduction) -> Iterator[Claim]:
         )
 
 
-def _q_faster(r: Reproduction, key: str, field: str) -> bool:
+def _q_faster(r: Results, key: str, field: str) -> bool:
     return share(r, key, 1, 16, field) < share(r, key, 16, 1, field)
 
 
@@ -109,7 +110,7 @@ def spans(see: Seen, test: str) -> tuple[tuple[float, float], tuple[float, float
     return (float(over_q[0]), float(over_p[0])), (float(over_q[1]), float(over_p[1]))
 
 
-def tables(r: Reproduction) -> Iterator[Claim]:
+def tables(r: Results) -> Iterator[Claim]:
     """Tables 1 to 3."""
     lines, other = paper.TABLE_1_CHY101_LINES, paper.TIMES_MS["nonlinear-chy101-n"]
     reference = np.array([[other[P, Q] for Q in paper.TABLE_Q] for P in paper.TABLE_P])

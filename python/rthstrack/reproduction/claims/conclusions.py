@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rthstrack.factors import key_frequencies
-from rthstrack.monitor import Monitor
-from rthstrack.reproduction import SCIPY, SPECTRAL, paper
+from rthstrack.evaluation.factors import key_frequencies
+from rthstrack.evaluation.monitor import Monitor
+from rthstrack.evaluation.tracking import evaluate
+from rthstrack.reproduction import paper
 from rthstrack.reproduction.claims.combined import spans
 from rthstrack.reproduction.claims.frequency_decimation import RECORDS
 from rthstrack.reproduction.claims.rows import (
@@ -33,16 +34,16 @@ from rthstrack.reproduction.claims.rows import (
     slip,
     timed,
 )
-from rthstrack.tracking import evaluate
+from rthstrack.reproduction.results import SCIPY, SPECTRAL
 
 if TYPE_CHECKING:
-    from rthstrack.reproduction import Reproduction
+    from rthstrack.reproduction.results import Results
 
 _KEYS = tuple(f"{kind}-{record.lower()}" for kind in TESTS for record in RECORDS)
 _P, _Q = (1, 2, 4, 8, 16, 32), paper.TABLE_Q
 
 
-def conclusions(r: Reproduction) -> Iterator[Claim]:
+def conclusions(r: Results) -> Iterator[Claim]:
     """Section 6, what was found."""
     yield by_window(
         r, "6", "nonlinear behaviour does not affect the approach with decimation (P below 64, Q up to 32)",
@@ -81,7 +82,7 @@ def conclusions(r: Reproduction) -> Iterator[Claim]:
     )  # fmt: skip
 
 
-def _q_matters_more(r: Reproduction) -> Claim:
+def _q_matters_more(r: Results) -> Claim:
     """Accuracy, of A and d, of both structures; and efficiency, by the printed times."""
     row = by_window(
         r, "6", "Q has more influence on accuracy and efficiency than P, both structures", "more influence", RECORDS,
@@ -98,7 +99,7 @@ def _q_matters_more(r: Reproduction) -> Claim:
     return replace(row, ours=ours, verdict=row.verdict if all(faster) else "differs")
 
 
-def future_work(r: Reproduction) -> Iterator[Claim]:
+def future_work(r: Results) -> Iterator[Claim]:
     """Section 6, what the authors wished for, each tried on a test of known gain and delay."""
     window = {"window": "tukey", "detrend": "mean"}
     for what, name, delay_s, where in (

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rthstrack.reproduction import CHEBYSHEV, LOWERED, SCIPY, SPECTRAL, paper
+from rthstrack.reproduction import paper
 from rthstrack.reproduction.cases import Trial
 from rthstrack.reproduction.claims.rows import (
     ENDS,
@@ -48,17 +48,18 @@ from rthstrack.reproduction.claims.rows import (
 )
 from rthstrack.reproduction.far_field import WINDOWS, discrepancy, largest_indicator
 from rthstrack.reproduction.paper_form import order_of_matlab
-from rthstrack.virtual_test import BoucWen
+from rthstrack.reproduction.results import CHEBYSHEV, LOWERED, SCIPY, SPECTRAL
+from rthstrack.virtual_test.parts import BoucWen
 
 if TYPE_CHECKING:
-    from rthstrack.reproduction import Reproduction
+    from rthstrack.reproduction.results import Results
 
 RECORDS = ("MU2035", "CHY101-N")
 _BELOW_64, _BELOW_128, _ABOVE_128 = (1, 2, 4, 8, 16, 32), (1, 2, 4, 8, 16, 32, 64), (256, 512)
 _EARLY, _LATE = [(P, 1) for P in (2, 4, 8, 16)], [(P, 1) for P in (16, 32, 64, 128, 256, 512)]
 
 
-def general(r: Reproduction) -> Iterator[Claim]:
+def general(r: Results) -> Iterator[Claim]:
     """Section 3, before 3.1."""
     yield not_compared("3", "sampling rates of up-to-date equipment", "up to 2048 Hz", "-", "a remark on equipment")
     cells = [
@@ -83,7 +84,7 @@ def general(r: Reproduction) -> Iterator[Claim]:
     )
 
 
-def linear_structure(r: Reproduction) -> Iterator[Claim]:
+def linear_structure(r: Results) -> Iterator[Claim]:
     """Section 3.1.1, the tests."""
     run = r.runs["linear-chy101-n"]
     structure = run.test.structure
@@ -148,7 +149,7 @@ def linear_structure(r: Reproduction) -> Iterator[Claim]:
         yield setting("3.1.1", f"frequency interval, {name}", f"{printed} Hz", f"{df:.7g} Hz", rounds_to(df, printed))
 
 
-def _other_frequencies(r: Reproduction) -> Claim:
+def _other_frequencies(r: Results) -> Claim:
     """At 1, 2 and 10 Hz; the last with half the delay, for it is not stable with 1 ms."""
     told, good, note = [], True, ""
     for name, delay_s in (("1 Hz", 1e-3), ("2 Hz", 1e-3), ("10 Hz", 1e-3), ("10 Hz, 0.5 ms", 0.5e-3)):
@@ -168,7 +169,7 @@ def _other_frequencies(r: Reproduction) -> Claim:
     )  # fmt: skip
 
 
-def _scale(r: Reproduction) -> Claim:
+def _scale(r: Results) -> Claim:
     small = r.trials["nonlinear, scaled by 0.1"].run
     assert small is not None
     found = {w: read_run(small, w) for w in WINDOWS}
@@ -184,7 +185,7 @@ def _scale(r: Reproduction) -> Claim:
     )
 
 
-def linear_by_p(r: Reproduction) -> Iterator[Claim]:
+def linear_by_p(r: Results) -> Iterator[Claim]:
     """Section 3.1.1, Figs 2 and 3."""
     highest = [r.studies[SPECTRAL].cell(source="linear-chy101-n", P=P).highest_frequency_hz for P in paper.POWERS]
     yield setting(
@@ -224,7 +225,7 @@ def _words(test: str) -> Callable[[Seen], str]:
     return lambda see: errors_text(see, test, _ABOVE_128)
 
 
-def _times(r: Reproduction, test: str, section: str, half: bool) -> Iterator[Claim]:
+def _times(r: Results, test: str, section: str, half: bool) -> Iterator[Claim]:
     for name in RECORDS:
         key = f"{test}-{name.lower()}"
         table = paper.TIMES_MS[key]
@@ -255,7 +256,7 @@ def _constant_in(table: dict[tuple[int, int], float]) -> bool:
     return max(later) <= 1.5 * min(later)
 
 
-def nonlinear_structure(r: Reproduction) -> Iterator[Claim]:
+def nonlinear_structure(r: Results) -> Iterator[Claim]:
     """Section 3.1.2, the tests."""
     run = r.runs["nonlinear-chy101-n"]
     law, structure, delay_s = run.test.actuators[0].specimen[0], run.test.structure, run.test.actuators[0].delay_s
@@ -322,7 +323,7 @@ def nonlinear_structure(r: Reproduction) -> Iterator[Claim]:
     )  # fmt: skip
 
 
-def nonlinear_by_p(r: Reproduction) -> Iterator[Claim]:
+def nonlinear_by_p(r: Results) -> Iterator[Claim]:
     """Section 3.1.2, Figs 5 to 7."""
     missing = stand_in(r, "MU2035")
     cell = r.cell(SPECTRAL, "nonlinear-mu2035")
@@ -390,6 +391,6 @@ def _critical_s(trial: Trial) -> float:
     return trial.critical_delay.delay_s
 
 
-def _discrepancy(r: Reproduction, kind: str, record: str) -> float:
+def _discrepancy(r: Results, kind: str, record: str) -> float:
     key = f"{kind}-{record.lower()}"
     return discrepancy(r.runs[key], r.perfect[key])

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rthstrack.reproduction import CHEBYSHEV, SCIPY, SPECTRAL, paper
+from rthstrack.reproduction import paper
 from rthstrack.reproduction.cases import FITTED_ALPHA, NOMINAL_ALPHA
 from rthstrack.reproduction.claims.frequency_decimation import interval_list
 from rthstrack.reproduction.claims.rows import (
@@ -42,10 +42,11 @@ from rthstrack.reproduction.claims.rows import (
     timed,
     unchanged,
 )
+from rthstrack.reproduction.results import CHEBYSHEV, SCIPY, SPECTRAL
 
 if TYPE_CHECKING:
-    from rthstrack.reproduction import Reproduction
-    from rthstrack.virtual_test import Run
+    from rthstrack.reproduction.results import Results
+    from rthstrack.virtual_test.run import Run
 
 #: The equivalent frequency of the experiment, at which the printed delays are compared with the residual.
 _FREQUENCY_HZ = 0.66
@@ -79,7 +80,7 @@ def fitted_alpha(printed_ms: dict[int, float]) -> AlphaFit:
     return min(fits, key=lambda fit: fit.rms_ms)
 
 
-def experiment(r: Reproduction) -> Iterator[Claim]:
+def experiment(r: Results) -> Iterator[Claim]:
     """Section 3.2, the tests and Fig 8."""
     run, remark = r.runs["experiment-29"], stand_in(r, "CANOGA")
     structure = run.test.structure
@@ -119,7 +120,7 @@ def experiment(r: Reproduction) -> Iterator[Claim]:
     yield setting("3.2", "frequency interval of the experiment", "0.0156 Hz", f"{df:.6f} Hz", rounds_to(df, "0.0156"))
 
 
-def _displacements(r: Reproduction, runs: list[Run]) -> Iterator[Claim]:
+def _displacements(r: Results, runs: list[Run]) -> Iterator[Claim]:
     bare = r.trials["frame without a damper"].run
     assert bare is not None
     remark = stand_in(r, "CANOGA")
@@ -150,7 +151,7 @@ def _residual_m(run: Run) -> float:
     return abs(float(run.target[-round(run.rate_hz) :].mean()))
 
 
-def by_p(r: Reproduction) -> Iterator[Claim]:
+def by_p(r: Results) -> Iterator[Claim]:
     """Section 3.2, Figs 9 and 10."""
 
     def amplitudes(see: Seen) -> tuple[float, float]:
@@ -230,7 +231,7 @@ def _delay(test: str, printed_ms: float) -> tuple[Callable[[Seen], bool], Callab
     return lambda see: abs(1e3 * see(test, 1, 1)[1] - printed_ms) <= _DELAY_TOLERANCE_MS, words
 
 
-def by_q(r: Reproduction) -> Iterator[Claim]:
+def by_q(r: Results) -> Iterator[Claim]:
     """Section 4.2."""
     yield interval_list(r, "4.2", "CANOGA", EXPERIMENTS[0])
     same = all(r.cell(SPECTRAL, key).delay_s == r.cell(CHEBYSHEV, key).delay_s for key in EXPERIMENTS)
@@ -273,7 +274,7 @@ def by_q(r: Reproduction) -> Iterator[Claim]:
     )  # fmt: skip
 
 
-def combined(r: Reproduction) -> Iterator[Claim]:
+def combined(r: Results) -> Iterator[Claim]:
     """Section 5.2."""
     for key, alpha_es in zip(EXPERIMENTS, paper.ALPHA_ES, strict=True):
         yield by_window(

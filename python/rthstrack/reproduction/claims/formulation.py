@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rthstrack.reproduction import SPECTRAL, paper
+from rthstrack.evaluation.indices import indices
+from rthstrack.evaluation.tracking import evaluate
+from rthstrack.reproduction import paper
 from rthstrack.reproduction.claims.rows import (
     ENDS,
     MOST,
@@ -29,17 +31,17 @@ from rthstrack.reproduction.claims.rows import (
     slip,
 )
 from rthstrack.reproduction.far_field import WINDOWS
-from rthstrack.tracking import evaluate, indices
+from rthstrack.reproduction.results import SPECTRAL
 
 if TYPE_CHECKING:
-    from rthstrack.reproduction import Reproduction
-    from rthstrack.virtual_test import Run
+    from rthstrack.reproduction.results import Results
+    from rthstrack.virtual_test.run import Run
 
 #: A phase beyond 90 degrees, to show what an arctangent of a ratio forgets; not the paper's.
 _EXAMPLE_S, _EXAMPLE_HZ = 0.060, 4.8
 
 
-def introduction(r: Reproduction) -> Iterator[Claim]:
+def introduction(r: Results) -> Iterator[Claim]:
     """Section 1."""
     run, small = r.runs["nonlinear-chy101-n"], r.trials["nonlinear, scaled by 0.1"].run
     assert small is not None
@@ -83,7 +85,7 @@ def introduction(r: Reproduction) -> Iterator[Claim]:
     )
 
 
-def formulation(r: Reproduction) -> Iterator[Claim]:
+def formulation(r: Results) -> Iterator[Claim]:
     """Section 2."""
     run, cell = r.runs["linear-chy101-n"], r.studies[SPECTRAL].cell(source="linear-chy101-n")
     n, n_bins = run.target.size, cell.n_bins

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from functools import partial
 from typing import TYPE_CHECKING
 
-from rthstrack.reproduction import SPECTRAL, paper
+from rthstrack.reproduction import paper
 from rthstrack.reproduction.cases import CASES
 from rthstrack.reproduction.claims.rows import (
     ENDS,
@@ -29,15 +29,16 @@ from rthstrack.reproduction.claims.rows import (
     timed,
     within,
 )
+from rthstrack.reproduction.results import SPECTRAL
 
 if TYPE_CHECKING:
-    from rthstrack.reproduction import Reproduction
+    from rthstrack.reproduction.results import Results
 
 RECORDS = ("MU2035", "CHY101-N")
 _ABOVE_32, _ABOVE_128 = (64, 128, 256, 512), (256, 512)
 
 
-def general(r: Reproduction) -> Iterator[Claim]:
+def general(r: Results) -> Iterator[Claim]:
     """Section 4 and 4.1."""
     n = 2 ** math.ceil(math.log2(20 * paper.RATE_HZ)) // 2
     yield slip(
@@ -57,7 +58,7 @@ def general(r: Reproduction) -> Iterator[Claim]:
     yield setting("4.1", "highest frequency with P = 1", "512 Hz", f"{highest:g} Hz", highest == 512)
 
 
-def interval_list(r: Reproduction, section: str, record: str, key: str) -> Claim:
+def interval_list(r: Results, section: str, record: str, key: str) -> Claim:
     """A printed list of frequency intervals, doubled on from a rounded one."""
     found = [r.studies[SPECTRAL].cell(source=key, Q=Q).delta_f_hz for Q in paper.POWERS]
     printed = paper.INTERVAL_HZ[record]
@@ -77,7 +78,7 @@ def interval_list(r: Reproduction, section: str, record: str, key: str) -> Claim
     )
 
 
-def linear_by_q(r: Reproduction) -> Iterator[Claim]:
+def linear_by_q(r: Results) -> Iterator[Claim]:
     """Section 4.1.1."""
     for name in RECORDS:
         yield interval_list(r, "4.1.1", name, f"linear-{name.lower()}")
@@ -110,7 +111,7 @@ def _deviates(see: Seen) -> bool:
     return after > max(0.001, 2 * before)
 
 
-def nonlinear_by_q(r: Reproduction) -> Iterator[Claim]:
+def nonlinear_by_q(r: Results) -> Iterator[Claim]:
     """Section 4.1.2."""
     for name in RECORDS:
         yield by_window(
@@ -139,7 +140,7 @@ def nonlinear_by_q(r: Reproduction) -> Iterator[Claim]:
     yield saves_without_loss(r, "4.1.2", ("nonlinear",), (1, 16), ("nonlinear-mu2035", "nonlinear-chy101-n"))
 
 
-def _times(r: Reproduction, key: str, section: str, quarter: bool) -> Iterator[Claim]:
+def _times(r: Results, key: str, section: str, quarter: bool) -> Iterator[Claim]:
     test, record = CASES[key].kind, CASES[key].record
     early, late = [(1, Q) for Q in (2, 4, 8, 16)], [(1, Q) for Q in (16, 32, 64, 128, 256, 512)]
     table = paper.TIMES_MS[key]

@@ -14,8 +14,8 @@ from rthstrack.reproduction.claims import (
 )
 
 if TYPE_CHECKING:
-    from rthstrack.reproduction import Reproduction
     from rthstrack.reproduction.claims.rows import Claim
+    from rthstrack.reproduction.results import Results
 
 _SECTIONS = (
     formulation.introduction,
@@ -39,6 +39,6 @@ _SECTIONS = (
 )
 
 
-def judge(r: Reproduction) -> tuple[Claim, ...]:
+def judge(r: Results) -> tuple[Claim, ...]:
     """All statements, in the paper's order."""
     return tuple(claim for section in _SECTIONS for claim in section(r))

@@ -7,15 +7,16 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
-from rthstrack.reproduction import LOWERED, ROUTES, SCIPY, SPECTRAL, paper
+from rthstrack.evaluation.tracking import evaluate
+from rthstrack.reproduction import paper
 from rthstrack.reproduction.cases import CASES
 from rthstrack.reproduction.far_field import OWN_FILTER, WINDOWS
-from rthstrack.tracking import evaluate
+from rthstrack.reproduction.results import LOWERED, ROUTES, SCIPY, SPECTRAL
 
 if TYPE_CHECKING:
-    from rthstrack.reproduction import Reproduction
     from rthstrack.reproduction.far_field import Component
-    from rthstrack.virtual_test import Run
+    from rthstrack.reproduction.results import Results
+    from rthstrack.virtual_test.run import Run
 
 Verdict: TypeAlias = Literal[
     "agrees", "agrees_in_paper_form", "slip", "setting", "time", "differs", "not_compared", "not_judged"
@@ -170,7 +171,7 @@ def timed(
 
 
 def by_window(
-    r: Reproduction,
+    r: Results,
     section: str,
     statement: str,
     printed: str,
@@ -228,7 +229,7 @@ _BEST_FIRST: tuple[Verdict, ...] = ("agrees", "not_compared", "differs")
 
 
 def by_own_filter(
-    r: Reproduction,
+    r: Results,
     section: str,
     statement: str,
     printed: str,
@@ -252,7 +253,7 @@ def by_own_filter(
 
 
 def in_how_many(
-    r: Reproduction,
+    r: Results,
     section: str,
     statement: str,
     printed: str,
@@ -279,7 +280,7 @@ def joined(*texts: str) -> str:
 # Readings -------------------------------------------------------------------------------------------------------------
 
 
-def seen(r: Reproduction, record: str, window: str) -> Seen:
+def seen(r: Results, record: str, window: str) -> Seen:
     """What was read of a record of the paper, or of its stand-in: by window, or with the paper's own filter."""
     suffix = "" if record == "CANOGA" else f"-{record.lower()}"
 
@@ -306,17 +307,17 @@ def read_run(run: Run, window: str) -> tuple[float, float]:
     return float(found.amplitude), float(found.delay_s)
 
 
-def stand_in(r: Reproduction, record: str) -> str:
+def stand_in(r: Results, record: str) -> str:
     """Which record stands in for one of the paper's; empty where none does."""
     return r.records[record].short_remark
 
 
-def case_stand_in(r: Reproduction, key: str) -> str:
+def case_stand_in(r: Results, key: str) -> str:
     """The same of a case."""
     return stand_in(r, CASES[key].record)
 
 
-def used_name(r: Reproduction, record: str) -> str:
+def used_name(r: Results, record: str) -> str:
     """The name of the record that was used for one of the paper's."""
     return r.records[record].motion.name if stand_in(r, record) else record
 
@@ -404,12 +405,12 @@ UNCHANGED = "A 0.01, d 0.3 ms"
 # Times ----------------------------------------------------------------------------------------------------------------
 
 
-def share(r: Reproduction, key: str, P: int, Q: int, field: str = "computing_time_s", route: str = SCIPY) -> float:
+def share(r: Results, key: str, P: int, Q: int, field: str = "computing_time_s", route: str = SCIPY) -> float:
     """The time at P and Q over that at P = Q = 1."""
     return float(getattr(r.cell(route, key, P, Q), field) / getattr(r.cell(route, key), field))
 
 
-def like_printed(r: Reproduction, key: str, factors: Iterable[tuple[int, int]], field: str) -> bool:
+def like_printed(r: Results, key: str, factors: Iterable[tuple[int, int]], field: str) -> bool:
     """Whether the shares of the paper's form here lie within a factor of the printed ones."""
     table = printed_from_one(key)
     return all(
@@ -417,20 +418,20 @@ def like_printed(r: Reproduction, key: str, factors: Iterable[tuple[int, int]], 
     )
 
 
-def constant(r: Reproduction, key: str, factors: Iterable[tuple[int, int]], field: str) -> bool:
+def constant(r: Results, key: str, factors: Iterable[tuple[int, int]], field: str) -> bool:
     """Whether the times of the paper's form are constant."""
     times = [float(getattr(r.cell(SCIPY, key, *at), field)) for at in factors]
     return max(times) <= _CONSTANT * min(times)
 
 
 def like_then_constant(
-    r: Reproduction, key: str, early: Sequence[tuple[int, int]], late: Sequence[tuple[int, int]], field: str
+    r: Results, key: str, early: Sequence[tuple[int, int]], late: Sequence[tuple[int, int]], field: str
 ) -> bool:
     """Both: like the printed shares first, then constant."""
     return like_printed(r, key, early, field) and constant(r, key, late, field)
 
 
-def share_about(r: Reproduction, key: str, at: tuple[int, int], printed: float, field: str) -> bool:
+def share_about(r: Results, key: str, at: tuple[int, int], printed: float, field: str) -> bool:
     """Whether a share of the paper's form is about the printed one."""
     return about(share(r, key, *at, field), printed)
 
@@ -448,7 +449,7 @@ def about(value: float, printed: float) -> bool:
     return 1 / _ABOUT <= value / printed <= _ABOUT
 
 
-def shares_text(r: Reproduction, key: str, factors: Sequence[tuple[int, int]]) -> str:
+def shares_text(r: Results, key: str, factors: Sequence[tuple[int, int]]) -> str:
     """Shares of the time at P = Q = 1, by SciPy's form and ours."""
     over_p = any(P > 1 for P, _ in factors)
     named = f"{'P' if over_p else 'Q'} = {', '.join(str(P if over_p else Q) for P, Q in factors)}"
@@ -470,7 +471,7 @@ def shares_listed(values: Iterable[float]) -> str:
 
 
 def saves_without_loss(
-    r: Reproduction, section: str, tests: Sequence[str], at: tuple[int, int], keys: Sequence[str]
+    r: Results, section: str, tests: Sequence[str], at: tuple[int, int], keys: Sequence[str]
 ) -> Claim:
     """'A value of 16 improves efficiency without losing accuracy': both halves are checked."""
     what = "P" if at[0] > 1 else "Q"

@@ -1,0 +1,1 @@
+"""Numbers: settings, inputs, results, estimators, response, indices, P and Q, the monitor."""

@@ -1,0 +1,204 @@
+"""The evaluation while the test runs: samples in as they come, gain and delay of the latest window out."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rthstrack._core import Monitor as CoreMonitor
+from rthstrack._core import causal_decimate as core_causal_decimate
+from rthstrack.errors import SettingError, SignalError
+from rthstrack.evaluation.inputs import _band, _count, _number, _samples
+from rthstrack.evaluation.results import _ends, _Result
+from rthstrack.evaluation.settings import MonitorSettings
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class Readings(_Result):
+    """Readings of one call, a row an actuator and window; intervals with (low, high) last.
+
+    `index` is that of the sample that completed the window, `time_s` its time from sample 0, `centre_s` the window's
+    centre in the same time, the decimator's delay taken out. Where `valid` is False the numbers are NaN and `reason`
+    says why; where it is True it says why there is no interval, or is empty.
+    """
+
+    index: NDArray[np.int64]
+    time_s: NDArray[np.float64]
+    centre_s: NDArray[np.float64]
+    actuator: NDArray[np.int64]
+    amplitude: NDArray[np.float64]
+    delay_s: NDArray[np.float64]
+    phase_rad: NDArray[np.float64]
+    equivalent_frequency_hz: NDArray[np.float64]
+    amplitude_interval: NDArray[np.float64]
+    delay_interval_s: NDArray[np.float64]
+    valid: NDArray[np.bool_]
+    reason: tuple[str, ...]
+    settings: MonitorSettings
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    def _columns(self) -> dict[str, Any]:
+        plain = ("index", "time_s", "centre_s", "actuator", "amplitude", "delay_s", "phase_rad",
+                 "equivalent_frequency_hz")  # fmt: skip
+        columns: dict[str, Any] = {name: getattr(self, name) for name in plain}
+        for name in ("amplitude_interval", "delay_interval_s"):
+            columns |= _ends(name, getattr(self, name))
+        return columns | {"valid": self.valid, "reason": list(self.reason)}
+
+
+def largest_decimation(rate_hz: float, high_hz: float, update_hz: float = 0.0) -> int:
+    """The largest P, a power of two, at which the causal decimator passes up to `high_hz`: rate / (4 P) >= high.
+
+    It leaves a sample for every reading: rate / P >= update.
+
+    >>> largest_decimation(1024, 32)
+    8
+    """
+    factor = 1
+    while high_hz * (1 - 1e-9) <= rate_hz / (8 * factor) and update_hz <= rate_hz / (2 * factor) and factor < 2**17:
+        factor *= 2
+    return factor
+
+
+class Monitor:
+    """Gain and delay while samples come: each reading is the evaluation of the latest `window_s` seconds.
+
+    Each reading equals `evaluate` on the window's samples (for the other estimators, `evaluate_moving` on a record that
+    ends with them), computed anew: nothing drifts, and a sample that is NaN or infinite spoils just the windows that
+    hold it.
+
+    rate_hz: samples a second. window_s: length of the window. update_hz: readings a second (rounded to a whole number
+    of decimated samples). band_hz, window, detrend, estimator, frequency_decimation, max_delay_s: as in `evaluate`.
+    data_decimation: P, a power of two: samples are low-passed and decimated as they come, which keeps up to
+    rate / (4 P); None chooses the largest for the band. With P above 1 "least_squares" leaves a band from 0 to
+    just that to the low-pass, as if `band_hz` were None. expected_delay_s: of delays that fit equally well (the target
+    is one tone) the one nearest to this is taken. minimum_amplitude: windows in which the target's amplitude (sqrt(2)
+    times its standard deviation) is less are not judged. n_actuators: channels that are stepped together.
+
+    A monitor has a state and belongs to one thread. Raises SettingError.
+
+    >>> import numpy as np
+    >>> t = np.arange(8192) / 1024
+    >>> def motion(t): return np.sin(9 * t) + 0.3 * np.sin(23 * t) + 0.2 * np.cos(41 * t)
+    >>> monitor = Monitor(1024, update_hz=16, band_hz=(0, 32), data_decimation=None, estimator="least_squares")
+    >>> for first in range(0, 8192, 1000):
+    ...     block = t[first : first + 1000]
+    ...     readings = monitor.process(motion(block), 0.95 * motion(block - 0.020))
+    >>> print(f"{readings.time_s[-1]:.3f} s: {readings.amplitude[-1]:.3f}, {1e3 * readings.delay_s[-1]:.2f} ms")
+    7.992 s: 0.950, 20.00 ms
+    """
+
+    __slots__ = ("_stream", "settings")
+
+    def __init__(
+        self,
+        rate_hz: float,
+        window_s: float = 4.0,
+        update_hz: float = 64.0,
+        *,
+        band_hz: tuple[float, float] | None = None,
+        window: str = "boxcar",
+        detrend: str = "mean",
+        estimator: str = "fei",
+        data_decimation: int | None = 1,
+        frequency_decimation: int = 1,
+        max_delay_s: float = 0.25,
+        expected_delay_s: float | None = None,
+        minimum_amplitude: float = 0.0,
+        n_actuators: int = 1,
+    ) -> None:
+        rate_hz, band = _number("rate_hz", rate_hz), _band(band_hz)
+        if data_decimation is None:
+            data_decimation = (
+                largest_decimation(rate_hz, band[1], _number("update_hz", update_hz)) if band and band[1] > 0 else 1
+            )
+        self.settings = MonitorSettings(
+            rate_hz,
+            _number("window_s", window_s),
+            _number("update_hz", update_hz),
+            band,
+            str(window),
+            str(detrend),
+            str(estimator),
+            _count("data_decimation", data_decimation),
+            _count("frequency_decimation", frequency_decimation),
+            _number("max_delay_s", max_delay_s),
+            None if expected_delay_s is None else _number("expected_delay_s", expected_delay_s),
+            _number("minimum_amplitude", minimum_amplitude),
+            _count("n_actuators", n_actuators),
+        )
+        self._stream = CoreMonitor(self.settings)
+
+    @property
+    def update_hz(self) -> float:
+        """Readings a second as they come."""
+        return self._stream.update_hz
+
+    @property
+    def latency_s(self) -> float:
+        """The decimator's delay: by how much the newest evaluated sample is older than the newest one given."""
+        return self._stream.latency_s
+
+    @property
+    def age_s(self) -> float:
+        """From a window's centre to the sample that brings its reading: time_s - centre_s."""
+        return self._stream.age_s
+
+    @property
+    def evaluated_rate_hz(self) -> float:
+        """Rate after decimation, rate_hz / P."""
+        return self._stream.evaluated_rate_hz
+
+    @property
+    def samples_until_reading(self) -> int:
+        """Samples until the next reading, the one that brings it included."""
+        return self._stream.samples_until_reading
+
+    def process(self, target: ArrayLike, measured: ArrayLike) -> Readings:
+        """Takes the next samples, (n_samples,) or (n_samples, n_actuators); returns the readings that they bring.
+
+        Any split of a stream into blocks gives the same readings, bit for bit. Raises SignalError for another shape.
+        """
+        t, m = _samples("target", np.atleast_1d(target)), _samples("measured", np.atleast_1d(measured))
+        n = self.settings.n_actuators
+        if t.ndim == 1 and n == 1:
+            t = t[:, None]
+        if m.ndim == 1 and n == 1:
+            m = m[:, None]
+        if t.shape != m.shape or t.ndim != 2 or t.shape[1] != n:
+            expected = "(n_samples,)" if n == 1 else f"(n_samples, {n})"
+            raise SignalError(f"target and measured must both have the shape {expected}, not {t.shape} and {m.shape}")
+        (index, actuator, valid), numbers, (amplitude_interval, delay_interval_s, reason) = self._stream.process(t, m)
+        time_s, centre_s, amplitude, delay_s, phase_rad, frequency_hz = numbers
+        return Readings(index, time_s, centre_s, actuator, amplitude, delay_s, phase_rad, frequency_hz,
+                        amplitude_interval, delay_interval_s, valid, tuple(reason), self.settings)  # fmt: skip
+
+    def restart(self, index: int = 0) -> None:
+        """Forgets all samples; the next one has this index, from 0 on. Raises SettingError."""
+        if isinstance(index, bool) or not isinstance(index, int | np.integer) or not 0 <= index < 1 << 63:
+            raise SettingError(f"index must be a whole number from 0 on, not {index!r}")
+        self._stream.restart(int(index))
+
+    def __repr__(self) -> str:
+        settings = ", ".join(f"{k}={v!r}" for k, v in dataclasses.asdict(self.settings).items())
+        return f"Monitor({settings})"
+
+
+def causal_decimate(samples: ArrayLike, data_decimation: int) -> tuple[NDArray[np.float64], int]:
+    """What a `Monitor` makes of one signal before it evaluates it, and the delay of that in samples.
+
+    y_m = sum_j h_j x_(m P + 16 P - j), j = 0 .. 16 P, speaks for sample m P + delay, delay = 8 P. h: Kaiser-windowed
+    sinc, flat within 2e-6 up to rate / (4 P). samples: (n_samples,). Raises SettingError, SignalError.
+    """
+    x = _samples("samples", samples)
+    if x.ndim != 1:
+        raise SignalError(f"samples must have the shape (n_samples,), not {x.shape}")
+    return core_causal_decimate(x, _count("data_decimation", data_decimation))

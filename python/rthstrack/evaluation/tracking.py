@@ -1,0 +1,423 @@
+"""The evaluation of Guo, Xu and Chen (2014) and the estimators beside it, for whole records and moving windows.
+
+Signs: delay_s > 0 means measured lags target; amplitude 1 is perfect. Units are SI; displacements keep the unit they
+come in. Signals are arrays of shape (n_samples,) or (n_samples, n_actuators).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import threading
+from collections import OrderedDict
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from rthstrack._core import Evaluator as CoreEvaluator
+from rthstrack._core import bridged as core_bridged
+from rthstrack._core import evaluate_moving as core_evaluate_moving
+from rthstrack.errors import RthstrackError, SettingError, SignalError
+from rthstrack.evaluation.bad_samples import _bad_samples, bad_words
+from rthstrack.evaluation.inputs import _count, _number, _pair
+from rthstrack.evaluation.results import _INTERVALS, _SPREADS, _ends, _Result
+from rthstrack.evaluation.settings import Settings
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from rthstrack.evaluation.bad_samples import BadSamples
+
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tracking(_Result):
+    """Amplitude and delay of measured over target for one record (Eqs 6-12, or by alignment).
+
+    Scalars for one pair, arrays of shape (n_actuators,) for several; intervals are (low, high), or (n_actuators, 2).
+    `amplitude_std`, `amplitude_interval`, `delay_std_s`, `delay_interval_s`: standard deviation and 95 % interval, from
+    the spectrum of what the fit leaves; `residual_coherence`: how far that still follows the target, 0 to 1;
+    `goodness`: the share of measured that one gain and one delay explain. All are NaN for "fei", and where not
+    determined. `target_noise_std`: standard deviation of the noise that is the target's own, in its unit, where it was
+    taken into account, else 0. `bad_samples`: what was found and left out, for each actuator. `reason` says why there
+    is no number, or no interval, and is empty where nothing is missing.
+    With `weights=True` also, per kept bin (n_bins,) or (n_bins, n_actuators): `frequency_hz` (n_bins,), `weights`
+    (sum to one), `target_spectrum` and `measured_spectrum` (complex DFT of the windowed, zero-padded signals).
+    """
+
+    amplitude: float | NDArray[np.float64]
+    phase_rad: float | NDArray[np.float64]
+    delay_s: float | NDArray[np.float64]
+    equivalent_frequency_hz: float | NDArray[np.float64]
+    fei: complex | NDArray[np.complex128]
+    n_bins: int
+    delta_f_hz: float
+    rate_hz: float
+    n_samples: int
+    settings: Settings
+    amplitude_std: float | NDArray[np.float64] = math.nan
+    amplitude_interval: tuple[float, float] | NDArray[np.float64] = (math.nan, math.nan)
+    delay_std_s: float | NDArray[np.float64] = math.nan
+    delay_interval_s: tuple[float, float] | NDArray[np.float64] = (math.nan, math.nan)
+    residual_coherence: float | NDArray[np.float64] = math.nan
+    goodness: float | NDArray[np.float64] = math.nan
+    target_noise_std: float | NDArray[np.float64] = 0.0
+    bad_samples: tuple[BadSamples, ...] | tuple[tuple[BadSamples, ...], ...] = ()
+    reason: str | tuple[str, ...] = ""
+    frequency_hz: NDArray[np.float64] | None = None
+    weights: NDArray[np.float64] | None = None
+    target_spectrum: NDArray[np.complex128] | None = None
+    measured_spectrum: NDArray[np.complex128] | None = None
+
+    def _columns(self) -> dict[str, Any]:
+        numbers = {
+            name: np.atleast_1d(getattr(self, name))
+            for name in ("amplitude", "phase_rad", "delay_s", "equivalent_frequency_hz", "fei", *_SPREADS)
+        }
+        for name in _INTERVALS:
+            numbers |= _ends(name, np.atleast_2d(np.asarray(getattr(self, name))))
+        numbers["reason"] = np.atleast_1d(np.asarray(self.reason, dtype=object))
+        each: Any = self.bad_samples if isinstance(self.reason, tuple) else (self.bad_samples,)
+        numbers["bad_samples_found"] = np.array([bad_words(found) for found in each], dtype=object)
+        same = {
+            "n_bins": self.n_bins,
+            "delta_f_hz": self.delta_f_hz,
+            "rate_hz": self.rate_hz,
+            "n_samples": self.n_samples,
+        }
+        n = len(numbers["amplitude"])
+        settings = {key: [value] * n for key, value in dataclasses.asdict(self.settings).items()}
+        return {"actuator": np.arange(n)} | numbers | {key: [value] * n for key, value in same.items()} | settings
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MovingTracking(_Result):
+    """The same over moving windows: arrays (n_readings,) or (n_readings, n_actuators), intervals with (low, high) last.
+
+    `time_s` is each window's centre, counted from the first sample. Where `valid` is False the window could not be
+    judged, most often for want of energy, and the numbers are NaN; `reason` says why, or why there is no interval, for
+    each reading (a tuple, or a tuple of them, one an actuator).
+    """
+
+    time_s: NDArray[np.float64]
+    amplitude: NDArray[np.float64]
+    phase_rad: NDArray[np.float64]
+    delay_s: NDArray[np.float64]
+    equivalent_frequency_hz: NDArray[np.float64]
+    valid: NDArray[np.bool_]
+    window_s: float
+    hop_s: float
+    minimum_std_ratio: float
+    rate_hz: float
+    settings: Settings
+    amplitude_std: NDArray[np.float64]
+    amplitude_interval: NDArray[np.float64]
+    delay_std_s: NDArray[np.float64]
+    delay_interval_s: NDArray[np.float64]
+    residual_coherence: NDArray[np.float64]
+    goodness: NDArray[np.float64]
+    target_noise_std: NDArray[np.float64]
+    bad_samples: tuple[BadSamples, ...] | tuple[tuple[BadSamples, ...], ...]
+    reason: tuple[str, ...] | tuple[tuple[str, ...], ...]
+
+    def _columns(self) -> dict[str, Any]:
+        n_actuators = 1 if self.amplitude.ndim == 1 else self.amplitude.shape[1]
+        names = ("amplitude", "phase_rad", "delay_s", "equivalent_frequency_hz", "valid", *_SPREADS)
+        columns: dict[str, Any] = {
+            "time_s": np.repeat(self.time_s, n_actuators),
+            "actuator": np.tile(np.arange(n_actuators), self.time_s.size),
+        } | {name: getattr(self, name).reshape(-1) for name in names}
+        for name in _INTERVALS:
+            columns |= _ends(name, getattr(self, name).reshape(-1, 2))
+        reason = np.array(self.reason, dtype=object).reshape(n_actuators, -1)
+        return columns | {"reason": reason.T.reshape(-1)}
+
+
+#: Samples of all plans that are kept for the next call: with its buffers a plan takes some 50 to 250 bytes a sample.
+_MOST_PLANNED = 1 << 22
+_plans: OrderedDict[tuple[int, float, Settings], CoreEvaluator] = OrderedDict()
+_plans_lock = threading.Lock()
+
+
+def _plan(n_samples: int, rate_hz: float, settings: Settings) -> CoreEvaluator:
+    """A plan of these, made anew unless it is among the latest."""
+    key = (n_samples, rate_hz, settings)
+    with _plans_lock:
+        if key in _plans:
+            _plans.move_to_end(key)
+            return _plans[key]
+    made = CoreEvaluator(n_samples, rate_hz, settings)
+    if n_samples <= _MOST_PLANNED:
+        with _plans_lock:
+            _plans[key] = made
+            while sum(n for n, *_ in _plans) > _MOST_PLANNED:
+                _plans.popitem(last=False)
+    return made
+
+
+class Evaluator:
+    """A plan for many records of one length and rate: checked and computed once, immutable, usable from many threads.
+
+    Takes the settings of `evaluate`; raises SettingError or SignalError where they are impossible for that length.
+    """
+
+    __slots__ = ("_plan", "n_samples", "rate_hz", "settings")
+
+    def __init__(self, n_samples: int, rate_hz: float, settings: Settings | None = None, **changes: Any) -> None:
+        try:
+            self.settings = dataclasses.replace(settings or Settings(), **changes)._checked()
+        except TypeError:
+            known = [f.name for f in dataclasses.fields(Settings)]
+            unknown = [name for name in changes if name not in known]
+            raise SettingError(f"unknown setting {', '.join(unknown)}: expected {', '.join(known)}") from None
+        self.n_samples = _count("n_samples", n_samples)
+        self.rate_hz = _number("rate_hz", rate_hz)
+        self._plan = _plan(self.n_samples, self.rate_hz, self.settings)
+
+    @property
+    def n_bins(self) -> int:
+        """Number of frequency bins that P, Q and the band keep."""
+        return self._plan.n_bins
+
+    @property
+    def delta_f_hz(self) -> float:
+        """Spacing of the kept bins, Q rate / n (Eq 9), in hertz."""
+        return self._plan.delta_f_hz
+
+    def evaluate(self, target: ArrayLike, measured: ArrayLike, *, weights: bool = False) -> Tracking:
+        """As the function `evaluate`, for signals of this length and rate."""
+        t, m = _pair(target, measured)
+        if len(t) != self.n_samples:
+            raise SignalError(f"this evaluator is planned for {self.n_samples} samples, not for {len(t)}")
+        return _tracking(self._plan, self.settings, self.rate_hz, t, m, weights)
+
+
+def evaluate(
+    target: ArrayLike,
+    measured: ArrayLike,
+    rate_hz: float,
+    *,
+    estimator: str = "fei",
+    data_decimation: int = 1,
+    frequency_decimation: int = 1,
+    decimator: str = "spectral",
+    weight_power: int = 2,
+    window: str = "boxcar",
+    detrend: str = "none",
+    band_hz: tuple[float, float] | None = None,
+    max_delay_s: float = 0.25,
+    expected_delay_s: float | None = None,
+    noise: str = "white",
+    noise_ratio: float = 0.0,
+    bad_samples: str = "leave_out",
+    weights: bool = False,
+) -> Tracking:
+    """Amplitude and delay of measured over target for whole records (Guo, Xu and Chen 2014, Eqs 1-12; or by alignment).
+
+    FEI = sum O_k conj(I_k) |I_k|^(l-2) / sum |I_k|^l,  f_eq = sum f_k |I_k|^l / sum |I_k|^l,
+    A = |FEI|,  phi = atan2(Im FEI, Re FEI),  d = -phi / (2 pi f_eq),
+    over the bins k = Q, 2Q, ... <= p/P of the transform zero-padded to n = 2^ceil(log2 L) = 2p points.
+
+    estimator: "fei", the above. "least_squares": the A and d that minimise sum (O(t) - A I(t - d))^2, and "aligned":
+    the d at which the FEI of O(t) and I(t - d) has no phase. Both shift the raw target before it is detrended and
+    windowed, so that windows, drift and averaged phases do not bias them, and give 95 % intervals; the samples at the
+    ends for which I(t - d) is not known are left out.
+
+    target, measured: (n_samples,) or (n_samples, n_actuators), any one unit; rate_hz: samples a second.
+    data_decimation: P, a power of two: keeps frequencies up to rate/(2P); decimator "spectral" keeps exactly the
+    bins of the undecimated transform, "chebyshev" filters and resamples as the paper did.
+    frequency_decimation: Q, a power of two: keeps every Q-th bin.
+    weight_power: l, 1 to 16. window: boxcar, hann, hamming, blackman, flattop or tukey (alpha 0.5).
+    detrend: none, mean or linear. band_hz: lowest and highest frequency kept, both included.
+    max_delay_s: "aligned" and "least_squares" look for delays and leads up to this, and a quarter of the record.
+    expected_delay_s: of delays that fit them equally well (turns of a motion that is one tone, or nearly) the one
+    nearest to this; None says "ambiguous".
+    noise, noise_ratio: of "least_squares" only. noise "coloured": both signals are whitened by an autoregression of
+    what a first fit leaves, and fitted again. noise_ratio: standard deviation of the noise on target over that on
+    measured; above 0, total least squares over the bins in which both stand clear of white noise.
+    bad_samples: "leave_out" (spikes, dropouts, frozen and clipped stretches have no part in the fit of "aligned" and
+    "least_squares", and of held samples the fresh ones are judged) or "keep"; what was found is `bad_samples`.
+    weights: also return the kept bins with their weights and spectra.
+
+    delay_s > 0: measured lags. Raises SignalError for samples that cannot be judged, SettingError for settings.
+
+    >>> import numpy as np
+    >>> t = np.arange(4096) / 1024
+    >>> target = np.sin(2 * np.pi * t) * np.hanning(4096)
+    >>> measured = 0.98 * np.interp(t - 0.012, t, target)
+    >>> result = evaluate(target, measured, 1024)
+    >>> print(f"{result.amplitude:.3f}, lags by {1e3 * result.delay_s:.2f} ms")
+    0.980, lags by 12.00 ms
+    """
+    t, m = _pair(target, measured)
+    settings = Settings(
+        estimator,
+        data_decimation,
+        frequency_decimation,
+        decimator,
+        weight_power,
+        window,
+        detrend,
+        band_hz,
+        max_delay_s,
+        expected_delay_s,
+        noise,
+        noise_ratio,
+        bad_samples,
+    )._checked()
+    rate_hz = _number("rate_hz", rate_hz)
+    return _tracking(_plan(len(t), rate_hz, settings), settings, rate_hz, t, m, weights)
+
+
+def _tracking(
+    plan: CoreEvaluator,
+    settings: Settings,
+    rate_hz: float,
+    target: NDArray[np.float64],
+    measured: NDArray[np.float64],
+    weights: bool,
+) -> Tracking:
+    spectra: tuple[Any, ...] = (None, None, None, None)
+    if weights:
+        found = plan.evaluate_with_spectra(target, measured)
+        numbers = [n for n, _ in found]
+        if target.ndim == 1:
+            spectra = found[0][1]
+        else:
+            columns = list(zip(*(s for _, s in found), strict=True))
+            spectra = (columns[0][0], *(np.stack(column, axis=1) for column in columns[1:]))
+    else:
+        numbers = plan.evaluate(target, measured)
+    averaged: Any
+    reason: str | tuple[str, ...]
+    bad: Any
+    if target.ndim == 1:
+        averaged, (*precision, entries, reason) = numbers[0]
+        bad = _bad_samples(entries, rate_hz)
+    else:
+        averaged = [np.array(v) for v in zip(*(n[0] for n in numbers), strict=True)]
+        *found_precision, each, reasons = zip(*(n[1] for n in numbers), strict=True)
+        precision, reason = [np.array(v) for v in found_precision], tuple(reasons)
+        bad = tuple(_bad_samples(entries, rate_hz) for entries in each)
+    about = (plan.n_bins, plan.delta_f_hz, rate_hz, len(target), settings)
+    fields: tuple[Any, ...] = (*averaged, *about, *precision, bad, reason, *spectra)
+    return Tracking(*fields)
+
+
+def _each_actuator(
+    target: NDArray[np.float64],
+    measured: NDArray[np.float64],
+    call: Callable[[NDArray[np.float64], NDArray[np.float64]], _T],
+) -> list[_T]:
+    """Applies `call` to each column; an error names the actuator."""
+    if target.ndim == 1:
+        return [call(target, measured)]
+    found = []
+    for a in range(target.shape[1]):
+        try:
+            found.append(call(np.ascontiguousarray(target[:, a]), np.ascontiguousarray(measured[:, a])))
+        except RthstrackError as error:
+            raise type(error)(f"actuator {a}: {error}") from None
+    return found
+
+
+def evaluate_moving(
+    target: ArrayLike,
+    measured: ArrayLike,
+    rate_hz: float,
+    *,
+    window_s: float = 4.0,
+    hop_s: float = 0.25,
+    minimum_std_ratio: float = 0.05,
+    estimator: str = "fei",
+    data_decimation: int = 1,
+    frequency_decimation: int = 1,
+    decimator: str = "spectral",
+    weight_power: int = 2,
+    window: str = "boxcar",
+    detrend: str = "none",
+    band_hz: tuple[float, float] | None = None,
+    max_delay_s: float = 0.25,
+    expected_delay_s: float | None = None,
+    noise: str = "white",
+    noise_ratio: float = 0.0,
+    bad_samples: str = "leave_out",
+) -> MovingTracking:
+    """A(t), d(t) and f_eq(t): `evaluate` on windows of window_s, one every hop_s.
+
+    Windows of W = round(window_s rate) samples start at 0, H, 2H, ... with H = round(hop_s rate); each reading of "fei"
+    is that of `evaluate` on the window's samples alone, and speaks for the window's centre (start + (W-1)/2) / rate.
+    "aligned" and "least_squares" take the shifted target's samples outside the window from the record, and where
+    several delays fit a window equally well, the one nearest to expected_delay_s, or else to the whole record's.
+    Where the target's standard deviation in the window is below minimum_std_ratio times that of the whole record, or
+    nothing is left to judge by, `valid` is False and the numbers are NaN.
+
+    Other arguments, shapes, signs and errors as in `evaluate`; SettingError for a window longer than the record.
+    """
+    t, m = _pair(target, measured)
+    settings = Settings(
+        estimator,
+        data_decimation,
+        frequency_decimation,
+        decimator,
+        weight_power,
+        window,
+        detrend,
+        band_hz,
+        max_delay_s,
+        expected_delay_s,
+        noise,
+        noise_ratio,
+        bad_samples,
+    )._checked()
+    rate_hz, window_s, hop_s = _number("rate_hz", rate_hz), _number("window_s", window_s), _number("hop_s", hop_s)
+    ratio = _number("minimum_std_ratio", minimum_std_ratio)
+    found = _each_actuator(t, m, lambda x, y: core_evaluate_moving(x, y, rate_hz, window_s, hop_s, ratio, settings))
+    time_s = found[0][0][0]
+    averaged: Any
+    reasons: Any
+    bad: Any
+    if t.ndim == 1:
+        (_, *averaged), (*precision, entries, reason) = found[0]
+        reasons = tuple(reason)
+        bad = _bad_samples(entries, rate_hz)
+    else:
+        averaged = [np.stack(column, axis=1) for column in list(zip(*(f[0] for f in found), strict=True))[1:]]
+        *found_precision, each_bad, each = zip(*(f[1] for f in found), strict=True)
+        bad = tuple(_bad_samples(entries, rate_hz) for entries in each_bad)
+        precision = [np.stack(column, axis=1) for column in found_precision]
+        reasons = tuple(tuple(r) for r in each)
+    columns = (time_s, *averaged, window_s, hop_s, ratio, rate_hz, settings, *precision, bad, reasons)
+    return MovingTracking(*columns)
+
+
+def bridged(
+    target: NDArray[np.float64], measured: NDArray[np.float64], rate_hz: float, trusted: Tracking
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Both signals of a pair, bad samples as the trusted gain and delay have them, or read between fresh ones.
+
+    What is left at the good samples beside them is carried over in a straight line, so that they speak for no cause.
+    """
+    found = core_bridged(target, measured, rate_hz, trusted.settings)
+    if found is None:
+        return target, measured
+    (target, measured), gaps = found
+    gain, delay = float(trusted.amplitude), float(trusted.delay_s) * rate_hz
+    if not math.isfinite(delay) or gain == 0:
+        return target, measured
+    index = np.arange(target.size, dtype=np.float64)
+
+    def fill(signal: NDArray[np.float64], gaps: list[tuple[int, int]], model: NDArray[np.float64]) -> None:
+        bad = np.zeros(signal.size, dtype=bool)
+        for start, end in gaps:
+            bad[start:end] = True
+        if bad.any() and not bad.all():
+            signal[bad] = model[bad] + np.interp(index[bad], index[~bad], (signal - model)[~bad])
+
+    fill(target, gaps[0], np.interp(index + delay, index, measured) / gain)
+    fill(measured, gaps[1], gain * np.interp(index - delay, index, target))
+    return target, measured

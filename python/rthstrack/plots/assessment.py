@@ -1,0 +1,427 @@
+"""Figures fit for a journal, drawn with Matplotlib from an `Assessment`; nothing is computed here.
+
+Every function takes `ax=` (one Axes, or a sequence of them where it needs several) and returns it; without `ax` it
+makes a figure of its own, one column wide, reachable as `ax.figure`. No pyplot: nothing global stays changed and no
+window opens. Colours are Okabe and Ito's, as on the report's page.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import matplotlib
+import matplotlib.font_manager
+import matplotlib.ticker
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+from rthstrack.errors import SettingError
+from rthstrack.plots.style import (
+    BAND,
+    DOUBLE_COLUMN_IN,
+    DOUBTFUL,
+    ERROR,
+    LIMIT,
+    MEASURED,
+    MUTED,
+    SECOND,
+    TARGET,
+    THIRD,
+    VALUE,
+    _axes,
+    _legend,
+    _several,
+    _shared_label,
+    _style,
+    _value_range,
+)
+from rthstrack.verdict import display
+from rthstrack.verdict.assessment import Assessment
+from rthstrack.verdict.limits import Limits
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from rthstrack.evaluation.response import FrequencyResponse, FrequencySlopes
+    from rthstrack.evaluation.tracking import MovingTracking
+
+_FORMATS = ("png", "pdf", "svg")
+
+
+def plot_time_history(
+    assessment: Assessment, *, ax: Axes | None = None, span_s: tuple[float, float] | None = None
+) -> Axes:
+    """Target and measured over time, in the signals' unit; `span_s` limits the time shown (s, the recording's own)."""
+    with _style():
+        ax = _axes(ax, 1.8)
+        target_role, measured_role = display.signal_roles(assessment.part)
+        time_s, part = _span(assessment, span_s)
+        ax.plot(time_s, assessment.target[part], color=TARGET, label=target_role)
+        ax.plot(time_s, assessment.measured[part], color=MEASURED, label=measured_role, linewidth=0.7)
+        ax.set_ylabel(_label(display.quantity(assessment.unit), assessment.unit))
+        _time_axis(ax, time_s)
+        _legend(ax, columns=2)
+    return ax
+
+
+def plot_error(assessment: Assessment, *, ax: Axes | None = None, span_s: tuple[float, float] | None = None) -> Axes:
+    """The error, measured less target, over time."""
+    with _style():
+        ax = _axes(ax, 1.5)
+        target_role, measured_role = display.signal_roles(assessment.part)
+        time_s, part = _span(assessment, span_s)
+        ax.axhline(0, color=MUTED, linewidth=0.5)
+        ax.plot(
+            time_s,
+            assessment.measured[part] - assessment.target[part],
+            color=ERROR,
+            label=f"{measured_role} \N{MINUS SIGN} {target_role}",
+        )
+        ax.set_ylabel(_label("Error", assessment.unit))
+        _time_axis(ax, time_s)
+        _legend(ax)
+    return ax
+
+
+def plot_loop(assessment: Assessment, *, ax: Axes | None = None, span_s: tuple[float, float] | None = None) -> Axes:
+    """Measured against target, same scale both ways; the opening shows the lag, the dashed line is perfect tracking."""
+    with _style():
+        ax = _axes(ax, 3.2)
+        target_role, measured_role = display.signal_roles(assessment.part)
+        _, part = _span(assessment, span_s)
+        target, measured = assessment.target[part], assessment.measured[part]
+        ends = [min(target.min(), measured.min()), max(target.max(), measured.max())]
+        ax.plot(ends, ends, color=MUTED, linestyle=(0, (5, 3)), linewidth=0.6)
+        # A long record crosses itself many thousand times; as vectors it would be slow to open and to print.
+        ax.plot(target, measured, color=VALUE, linewidth=0.6, rasterized=target.size > 20_000)
+        ax.set_aspect("equal", adjustable="box")
+        ax.set_xlabel(_label(target_role.capitalize(), assessment.unit))
+        ax.set_ylabel(_label(measured_role.capitalize(), assessment.unit))
+        _few_ticks(ax)
+    return ax
+
+
+def plot_spectra(assessment: Assessment, *, ax: Axes | None = None) -> Axes:
+    """Fourier amplitudes of both signals (unit*s, log/log) and, on an axis at the right, the weights of the evaluation.
+
+    Many bins are drawn by the extremes of groups of neighbours. The dashed line marks the equivalent frequency.
+    """
+    with _style():
+        ax = _axes(ax, 2.3)
+        t = assessment.tracking
+        target_role, measured_role = display.signal_roles(assessment.part)
+        if t.frequency_hz is None or t.weights is None or t.target_spectrum is None or t.measured_spectrum is None:
+            return _note(ax, "no spectra: evaluated without weights")
+        scale = display.fourier_scale(t)
+        target, measured = np.abs(t.target_spectrum) * scale, np.abs(t.measured_spectrum) * scale
+        edges = display.log_edges(t.frequency_hz.size, 3_000)
+        kept = display.extremes((target, measured, t.weights), edges)
+        frequency, target, measured, weights = (
+            column[kept] for column in (t.frequency_hz, target, measured, t.weights)
+        )
+        shown = display.judged_range(t) or (float(frequency[0]), float(frequency[-1]))
+        inside = (frequency >= shown[0]) & (frequency <= shown[1])
+        weight_axis = ax.twinx()
+        weight_axis.fill_between(frequency, weights, color=SECOND, alpha=0.3, linewidth=0)
+        weight_axis.set_ylim(0, 1.15 * float(weights[inside].max(initial=0.0)) or 1.0)
+        weight_axis.set_ylabel("Weight of a bin (-)", color=SECOND)
+        weight_axis.tick_params(axis="y", colors=SECOND)
+        weight_axis.spines["right"].set_visible(True)
+        weight_axis.spines["right"].set_color(SECOND)
+        # The curves belong in front of the weights, although the weights' axis was added later.
+        ax.set_zorder(weight_axis.get_zorder() + 1)
+        ax.patch.set_visible(False)
+        ax.loglog(frequency, target, color=TARGET, label=target_role)
+        ax.loglog(frequency, measured, color=MEASURED, label=measured_role, linewidth=0.7)
+        _frequency_axis(ax, *shown)
+        peak = max(target[inside].max(initial=0.0), measured[inside].max(initial=0.0))
+        low = min(target[inside].min(initial=peak), measured[inside].min(initial=peak))
+        if peak > 0:
+            ax.set_ylim(max(low, 1e-6 * peak) / 1.5, peak * 4)
+        _mark_equivalent_frequency(ax, assessment)
+        ax.set_ylabel(_label("Fourier amplitude", f"{assessment.unit} s" if assessment.unit else None))
+        _legend(ax, columns=2)
+    return ax
+
+
+def plot_frequency_response(
+    result: Assessment | FrequencyResponse, *, ax: Sequence[Axes] | NDArray[Any] | None = None
+) -> Sequence[Axes] | NDArray[Any]:
+    """Gain, delay (ms) and coherence over frequency on three axes, with 95 % intervals; grey where coherence is low.
+
+    Two axes in place of three leave the coherence out. An assessment also gives the straight lines over the frequencies
+    that hold the energy (dashed).
+    """
+    with _style():
+        ax = _several(ax, 2 if np.shape(np.array(ax, dtype=object)) == (2,) else 3, 3.8)
+        response = result.response if isinstance(result, Assessment) else result
+        limits = result.limits if isinstance(result, Assessment) else Limits()
+        gain_axis, delay_axis = ax[:2]
+        if response is None:
+            for one in ax:
+                _note(one, (result.response_note if isinstance(result, Assessment) else None) or "not determined")
+            return ax
+        above_zero = response.frequency_hz > 0
+        frequency, coherence = response.frequency_hz[above_zero], response.coherence[above_zero]
+        sure = coherence >= display.LOW_COHERENCE
+        shown = display.judged_range(result.tracking) if isinstance(result, Assessment) else None
+        low, high = shown or (float(frequency[0]), float(frequency[-1]))
+        low = max(low, float(frequency[0]))
+        in_view = (frequency >= low) & (frequency <= high)
+        for axis, values, interval, ideal, least in (
+            (gain_axis, response.gain[above_zero], response.gain_interval[above_zero], 1.0, 0.02),
+            (delay_axis, response.delay_s[above_zero] * 1e3, response.delay_interval_s[above_zero] * 1e3, 0.0, 0.5),
+        ):
+            axis.axhline(ideal, color=MUTED, linewidth=0.5)
+            axis.fill_between(frequency, interval[:, 0], interval[:, 1], color=VALUE, alpha=BAND, linewidth=0)
+            axis.semilogx(frequency, values, color=DOUBTFUL)
+            axis.semilogx(frequency, np.where(sure, values, np.nan), color=VALUE, linewidth=1)
+            relied_on = values[sure & in_view]
+            _value_range(axis, relied_on if relied_on.size else values[in_view], ideal, least)
+        for coherence_axis in ax[2:]:
+            coherence_axis.semilogx(frequency, coherence, color=DOUBTFUL)
+            coherence_axis.semilogx(frequency, np.where(sure, coherence, np.nan), color=VALUE, linewidth=1)
+            coherence_axis.axhline(display.LOW_COHERENCE, color=MUTED, linewidth=0.5, linestyle=(0, (1, 2)))
+            coherence_axis.set_ylim(0, 1.05)
+            coherence_axis.set_ylabel("Coherence (-)")
+        if isinstance(result, Assessment):
+            _slope_lines(gain_axis, delay_axis, result.slopes)
+        _limit_lines(gain_axis, delay_axis, limits)
+        gain_axis.set_ylabel("Gain (-)")
+        delay_axis.set_ylabel("Delay (ms)")
+        for axis in ax:
+            _frequency_axis(axis, low, high)
+            if isinstance(result, Assessment):
+                _mark_equivalent_frequency(axis, result, labelled=axis is gain_axis)
+        _shared_label(ax, "Frequency (Hz)")
+    return ax
+
+
+def plot_moving(
+    result: Assessment | MovingTracking, *, ax: Sequence[Axes] | NDArray[Any] | None = None
+) -> Sequence[Axes] | NDArray[Any]:
+    """A(t) and d(t) (ms) of moving windows, at their centres, on two axes; gaps where nothing could be determined.
+
+    An assessment gives the trusted estimate with its 95 % intervals as a band beside the one asked for, its limits
+    (dashed) and the whole record's trusted A and d (dotted).
+    """
+    with _style():
+        ax = _several(ax, 2, 2.8)
+        assessment = result if isinstance(result, Assessment) else None
+        moving = result.moving if isinstance(result, Assessment) else result
+        amplitude_axis, delay_axis = ax
+        if moving is None:
+            for one in ax:
+                _note(one, (assessment.moving_note if assessment else None) or "not determined")
+            return ax
+        time_s = moving.time_s + (assessment.start_s if assessment else 0.0)
+        trusted = assessment.trusted_moving if assessment else moving
+        if trusted is moving:
+            trusted = moving if moving.settings.estimator == "least_squares" else None
+        for axis, name, factor, ideal, least in (
+            (amplitude_axis, "amplitude", 1.0, 1.0, 0.02),
+            (delay_axis, "delay_s", 1e3, 0.0, 0.5),
+        ):
+            axis.axhline(ideal, color=MUTED, linewidth=0.5)
+            shown = []
+            if trusted is not moving:
+                values = np.where(moving.valid, getattr(moving, name), np.nan) * factor
+                colour, width = (VALUE, 1.0) if trusted is None else (THIRD, 0.7)
+                axis.plot(
+                    time_s, values, color=colour, linewidth=width, label=display.ESTIMATORS[moving.settings.estimator]
+                )
+                shown.append(values)
+            if trusted is not None:
+                values = np.where(trusted.valid, getattr(trusted, name), np.nan) * factor
+                ends = (trusted.amplitude_interval if name == "amplitude" else trusted.delay_interval_s) * factor
+                axis.fill_between(time_s, ends[:, 0], ends[:, 1], color=VALUE, alpha=BAND, linewidth=0)
+                axis.plot(time_s, values, color=VALUE, linewidth=1, label="trusted")
+                shown.append(values)
+            _value_range(axis, np.concatenate(shown), ideal, least)
+        if assessment is not None and trusted is not None and trusted is not moving:
+            _legend(amplitude_axis, columns=2)
+        if assessment is not None:
+            whole = assessment.trusted if math.isfinite(float(assessment.trusted.delay_s)) else assessment.tracking
+            dotted: Any = {"color": VALUE, "linewidth": 0.6, "linestyle": (0, (1, 2))}
+            amplitude_axis.axhline(float(whole.amplitude), **dotted)
+            delay_axis.axhline(float(whole.delay_s) * 1e3, **dotted)
+            _limit_lines(amplitude_axis, delay_axis, assessment.limits)
+        amplitude_axis.set_ylabel("A (-)")
+        delay_axis.set_ylabel("d (ms)")
+        for axis in ax:
+            if assessment is not None:
+                axis.set_xlim(assessment.start_s, assessment.start_s + assessment.target.size / assessment.rate_hz)
+            elif time_s.size > 1:
+                axis.set_xlim(time_s[0], time_s[-1])
+        _shared_label(ax, "Time (s)")
+    return ax
+
+
+def plot_indices(
+    assessment: Assessment, *, ax: Sequence[Axes] | NDArray[Any] | None = None
+) -> Sequence[Axes] | NDArray[Any]:
+    """Histories of the time-domain indices on two axes: largest and RMS error so far, and the tracking indicator."""
+    with _style():
+        ax = _several(ax, 2, 2.8)
+        error_axis, indicator_axis = ax
+        h = assessment.histories
+        time_s = assessment.start_s + np.arange(h.rms_error.size) / h.rate_hz
+        error_axis.plot(time_s, h.max_tracking_error, color=ERROR, label="MTE")
+        error_axis.plot(time_s, h.rms_error, color=THIRD, label="RMS")
+        error_axis.set_ylim(bottom=0)
+        error_axis.set_ylabel(_label("Error so far", assessment.unit))
+        _legend(error_axis, columns=2)
+        indicator_axis.axhline(0, color=MUTED, linewidth=0.5)
+        indicator_axis.plot(time_s, h.tracking_indicator, color=SECOND)
+        indicator_axis.set_ylabel(_label("TI", f"{assessment.unit}²" if assessment.unit else None))
+        for axis in ax:
+            _time_axis(axis, time_s)
+        _shared_label(ax, "Time (s)")
+    return ax
+
+
+def figure(assessment: Assessment) -> Figure:
+    """One figure, two columns wide: histories, their strongest 4 s, loop, spectra, A and d over time and frequency."""
+    with _style():
+        page = Figure(figsize=(DOUBLE_COLUMN_IN, 8.2), layout=ConstrainedLayoutEngine(w_pad=0.05, h_pad=0.05))
+        # Grids within a grid: columns of one width for all rows would have no room for the labels between them.
+        rows = page.add_gridspec(4, 1, height_ratios=(1.1, 1.7, 1.7, 2.6))
+        enlarged, curves = rows[1].subgridspec(1, 5), rows[3].subgridspec(2, 2)
+        first, end = display.strongest_span(assessment.target, assessment.rate_hz)
+        strongest = (
+            assessment.start_s + first / assessment.rate_hz,
+            assessment.start_s + (end - 1) / assessment.rate_hz,
+        )
+        history = plot_time_history(assessment, ax=page.add_subplot(rows[0]))
+        history.axvspan(*strongest, color="#000000", alpha=0.08, linewidth=0)
+        zoomed = plot_time_history(assessment, ax=page.add_subplot(enlarged[:3]), span_s=strongest)
+        loop = plot_loop(assessment, ax=page.add_subplot(enlarged[3:]), span_s=strongest)
+        spectra = plot_spectra(assessment, ax=page.add_subplot(rows[2]))
+        moving = [page.add_subplot(curves[row, 0]) for row in (0, 1)]
+        plot_moving(assessment, ax=moving)
+        response = [page.add_subplot(curves[row, 1]) for row in (0, 1)]
+        plot_frequency_response(assessment, ax=response)
+        for axis, letter in zip((history, zoomed, loop, spectra, *moving, *response), "abcdefgh", strict=True):
+            axis.set_title(f"({letter})", loc="left", fontweight="bold", pad=3)
+    return page
+
+
+def write_figure(assessment: Assessment, path: str | Path) -> None:
+    """Write `figure(assessment)` as PNG (600 dpi), PDF or SVG, by the ending of `path`.
+
+    Errors: SettingError where the ending is another, or the file cannot be written.
+    """
+    ending = Path(path).suffix.lower().removeprefix(".")
+    if ending not in _FORMATS:
+        found = f"ends in .{ending}" if ending else "has no ending"
+        raise SettingError(f"{path}: a figure is written as .png, .pdf or .svg, this name {found}; choose one of these")
+    page = figure(assessment)
+    try:
+        with _style():
+            page.savefig(path, format=ending)
+    except OSError as error:
+        raise SettingError(
+            f"{path}: cannot write the figure there ({error.strerror}); name a file in an existing, writable folder"
+        ) from error
+
+
+def _label(name: str, unit: str | None) -> str:
+    """A label with its unit; a dollar sign in it would otherwise start a formula."""
+    return display.with_unit(name, unit).replace("$", r"\$")
+
+
+def _span(assessment: Assessment, span_s: tuple[float, float] | None) -> tuple[NDArray[np.float64], slice]:
+    """The times of the samples within `span_s` and the slice that takes them."""
+    n, rate_hz = assessment.target.size, assessment.rate_hz
+    first, end = 0, n
+    if span_s is not None:
+        first = max(int(np.ceil((span_s[0] - assessment.start_s) * rate_hz - 1e-6)), 0)
+        end = min(int(np.floor((span_s[1] - assessment.start_s) * rate_hz + 1e-6)) + 1, n)
+    if end - first < 2:
+        last = assessment.start_s + (n - 1) / rate_hz
+        raise SettingError(
+            f"span_s {span_s} holds fewer than two samples; the record runs from {assessment.start_s:g} to {last:g} s"
+        )
+    return assessment.start_s + np.arange(first, end) / rate_hz, slice(first, end)
+
+
+def _time_axis(ax: Axes, time_s: NDArray[np.float64]) -> None:
+    ax.set_xlim(time_s[0], time_s[-1])
+    ax.set_xlabel("Time (s)")
+
+
+def _frequency_axis(ax: Axes, low: float, high: float) -> None:
+    """A logarithmic axis whose labels are plain numbers: 1 2 5 over a few decades, whole decades over more."""
+    if low < high:
+        ax.set_xlim(low, high)
+    few = high < 300 * low
+    ax.xaxis.set_major_locator(matplotlib.ticker.LogLocator(subs=(1, 2, 5) if few else (1,)))
+    ax.xaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.xaxis.set_minor_formatter(matplotlib.ticker.NullFormatter())
+    ax.set_xlabel("Frequency (Hz)")
+
+
+def _few_ticks(ax: Axes) -> None:
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(matplotlib.ticker.MaxNLocator(5, steps=[1, 2, 5, 10]))
+
+
+def _slope_lines(gain_axis: Axes, delay_axis: Axes, slopes: FrequencySlopes | None) -> None:
+    """Gain and delay as straight lines over frequency, which a logarithmic axis bends."""
+    if slopes is None:
+        return
+    frequency = np.linspace(*slopes.band_hz, 100)
+    away = frequency - slopes.equivalent_frequency_hz
+    for axis, value, slope in (
+        (gain_axis, slopes.gain, slopes.gain_per_hz),
+        (delay_axis, slopes.delay_s * 1e3, slopes.delay_s_per_hz * 1e3),
+    ):
+        axis.plot(frequency, value + slope * away, color=SECOND, linewidth=0.8, linestyle=(0, (5, 3)))
+
+
+def _limit_lines(amplitude_axis: Axes, delay_axis: Axes, limits: Limits) -> None:
+    """Limits as dashed lines; one far from the curve stays out of view."""
+    for axis, limit, around in ((amplitude_axis, limits.amplitude, 1.0), (delay_axis, _ms(limits.delay_s), 0.0)):
+        if limit is None:
+            continue
+        low, high = axis.get_ylim()
+        span = high - low
+        for value in (around - limit, around + limit):
+            if low - 2 * span < value < high + 2 * span:
+                axis.axhline(value, color=LIMIT, linewidth=0.7, linestyle=(0, (5, 3)))
+                low, high = min(low, value - 0.05 * span), max(high, value + 0.05 * span)
+        axis.set_ylim(low, high)
+
+
+def _ms(seconds: float | None) -> float | None:
+    return None if seconds is None else 1e3 * seconds
+
+
+def _mark_equivalent_frequency(ax: Axes, assessment: Assessment, labelled: bool = True) -> None:
+    f_eq = float(assessment.tracking.equivalent_frequency_hz)
+    if not np.isfinite(f_eq):
+        return
+    ax.axvline(f_eq, color=MUTED, linewidth=0.7, linestyle=(0, (4, 3)))
+    if labelled:
+        ax.annotate(
+            r"$f_\mathrm{eq}$",
+            (f_eq, 1),
+            xycoords=("data", "axes fraction"),
+            xytext=(3, -2),
+            textcoords="offset points",
+            va="top",
+            color=MUTED,
+        )
+
+
+def _note(ax: Axes, text: str) -> Axes:
+    ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color=MUTED, wrap=True)
+    ax.set_xticks([])
+    ax.set_yticks([])
+    return ax

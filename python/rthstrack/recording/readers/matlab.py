@@ -1,0 +1,120 @@
+"""MATLAB's variables as channels, named as MATLAB would name them; what v5 and v7.3 files have in common."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from rthstrack.recording.readers.arrays import columns, rate_of
+from rthstrack.recording.readers.contents import Contents, RateStatement, Series
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+# Deeper nesting than this is a reference that leads back to itself.
+_DEEPEST = 32
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Struct:
+    """A struct array: the fields of each element, in MATLAB's order."""
+
+    elements: Sequence[Mapping[str, Node]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cell:
+    """A cell array in MATLAB's order."""
+
+    elements: Sequence[Node]
+
+
+@dataclass(frozen=True, slots=True)
+class Opaque:
+    """What cannot be read outside MATLAB (`what` is its class) or holds no real numbers."""
+
+    what: str
+    is_object: bool
+
+
+Node: TypeAlias = "NDArray[Any] | str | Struct | Cell | Opaque"
+
+
+def contents(form: str, variables: Mapping[str, Node]) -> Contents:
+    """The channels of named variables; single numbers named fs, rate, rate_hz, dt or Ts state the rate."""
+    walk = _Walk([], [], [])
+    for name, node in variables.items():
+        walk.visit(name, node, None, None, 0)
+    objects = [note for note in walk.notes if "MATLAB object" in note]
+    # What cannot be read is the first thing to say where nothing else was found.
+    notes = objects + [note for note in walk.notes if note not in objects]
+    one_matrix = len(variables) == 1 and isinstance(next(iter(variables.values())), np.ndarray)
+    return Contents(form, tuple(walk.series), (), tuple(walk.statements), tuple(notes), nameless=one_matrix)
+
+
+def indexed(name: str, indices: Sequence[int | None]) -> str:
+    """`name(:,2)` for indices (None, 1): from 1, None for all of a dimension."""
+    return f"{name}({','.join(':' if i is None else str(i + 1) for i in indices)})"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Walk:
+    series: list[Series]
+    statements: list[RateStatement]
+    notes: list[str]
+
+    def visit(self, name: str, node: Node, label: str | None, unit: str | None, depth: int) -> None:
+        if depth > _DEEPEST:
+            self.notes.append(f"'{name}' is nested too deep")
+        elif isinstance(node, Struct):
+            for i, fields in enumerate(node.elements):
+                self.fields(name if len(node.elements) == 1 else f"{name}({i + 1})", fields, depth)
+        elif isinstance(node, Cell):
+            for i, element in enumerate(node.elements):
+                self.visit(f"{name}{{{i + 1}}}", element, None, None, depth + 1)
+        elif isinstance(node, Opaque):
+            self.notes.append(_not_read(name, node))
+        elif isinstance(node, np.ndarray):
+            self.array(name, node, label, unit)
+
+    def fields(self, name: str, fields: Mapping[str, Node], depth: int) -> None:
+        """One element of a struct; `label` and `unit` beside numbers speak of these (as in Simulink's structures)."""
+        label = _text(fields, "label", "name")
+        unit = _text(fields, "unit", "units")
+        for key, node in fields.items():
+            about = key.lower() in ("values", "data", "value", "y")
+            self.visit(f"{name}.{key}", node, label if about else None, unit if about else None, depth + 1)
+
+    def array(self, name: str, array: NDArray[Any], label: str | None, unit: str | None) -> None:
+        rate = rate_of(name, array) if array.size == 1 and array.dtype.kind in "iuf" else None
+        if rate is not None:
+            self.statements.append(RateStatement(f"'{name}'", rate))
+            return
+        found = columns(name, array, unit, self.notes, indexed)
+        if label and len(found) == 1:
+            found = [Series(label, found[0].path, found[0].unit, found[0].values)]
+        self.series.extend(found)
+
+
+def _text(fields: Mapping[str, Node], *keys: str) -> str | None:
+    for key, node in fields.items():
+        if key.lower() in keys and isinstance(node, str) and node.strip():
+            return node.strip()
+    return None
+
+
+def _not_read(name: str, node: Opaque) -> str:
+    if not node.is_object:
+        return f"'{name}' is {node.what}, no channel"
+    ways = {
+        "timeseries": f"save {name}.Time and {name}.Data",
+        "table": f"save table2struct({name},'ToScalar',true)",
+        "timetable": f"save table2struct(timetable2table({name}),'ToScalar',true)",
+        "Simulink.SimulationData.Dataset": f"save {name}{{1}}.Values.Time and {name}{{1}}.Values.Data",
+    }
+    way = ways.get(node.what, "save its numbers as plain arrays or structs")
+    return f"'{name}' is a MATLAB object ({node.what}), which only MATLAB can read; {way} instead"

@@ -1,0 +1,141 @@
+"""Delimited text of any form; the parsing is done by the core."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rthstrack._core import read_text as core_read_text
+from rthstrack.errors import RecordingError
+from rthstrack.recording.readers.arrays import tidy
+from rthstrack.recording.readers.contents import Clock, Contents, RateStatement, Series
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+# A number by decimal mark; a comma between groups of three digits only in `key: 1,000`.
+_NUMBERS = {mark: rf"[-+]?(?:\d+(?:[{mark}]\d*)?|[{mark}]\d+)(?:[eEdD][-+]?\d+)?" for mark in ".,"}
+_GROUPED = r"(?<=[:=;\s])\d{1,3}(?:,\d{3})+(?:\.\d*)?(?![\d,])"
+_RATE_KEY = (
+    r"(?:sampl(?:e|es|ing)|scan|acquisition|acq|daq|data|logging|log|recording)[ _-]*(?:rate|freq(?:uency)?)(?:[ _]hz)?"
+    r"|(?:abtast|mess)(?:rate|frequenz)|fr[ée]quence d.[ée]chantillonnage|frecuencia de muestreo|rate_hz|fs"
+)
+# Not "sampling time", which may be how long the sampling took.
+_STEP_KEY = (
+    r"(?:sampl(?:e|es|ing)|scan)[ _-]*(?:interval|period|step)|time[ _-]*(?:step|interval|increment)"
+    r"|abtastintervall|delta[ _]?[tx]|dt"
+)
+_HERTZ = {"hz": 1.0, "khz": 1e3, "s/s": 1.0, "ks/s": 1e3, "sps": 1.0, "1/s": 1.0, "samples/s": 1.0, "samples/sec": 1.0}
+_SECOND = {"s": 1.0, "sec": 1.0, "secs": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3, "us": 1e-6}
+_SECOND["µs"] = 1e-6
+
+
+def _statement(key: str, units: Iterable[str], mark: str) -> re.Pattern[str]:
+    """The words, perhaps a unit in brackets, a separator, a number that is no date or time of day, perhaps a unit.
+
+    A word behind the number that is followed by more is the next key, and no unit; in the next cell only a known unit
+    is one.
+    """
+    number = _NUMBERS[mark] if mark == "," else f"{_GROUPED}|{_NUMBERS[mark]}"
+    known = "|".join(map(re.escape, units))
+    return re.compile(
+        rf"(?<![a-zäöüé_])(?P<key>{key})\s*(?:[\[(]\s*(?P<unit>[^\])]{{1,12}})[\])])?\s*[:=,;\t ]\s*[\"']?\s*"
+        rf"(?P<value>{number})(?![\d]|[.:/-]\d)(?:[ ]*(?P<behind>[a-zµ1][a-zµ/1]*)(?!\s*[:=\w])"
+        rf"|\s*[,;\t]\s*(?P<cell>{known})(?![\w/]))?",
+        re.IGNORECASE,
+    )
+
+
+def read(path: Path) -> Contents:
+    """Reads a text file: comma, semicolon, tab, bar or blanks between columns, with any preamble."""
+    try:
+        table = core_read_text(path.read_bytes())
+    except ValueError as error:
+        raise RecordingError(str(error)) from None
+    series: list[Series] = []
+    clocks: list[Clock] = []
+    notes: list[str] = list(table["notes"])
+    nameless = True
+    for index, name, unit, kind, values in table["columns"]:
+        nameless &= name is None
+        label = f"column {index}" if name is None else name
+        if kind == "numbers":
+            series.append(Series(label, label, unit, values))
+        elif kind == "text":
+            notes.append(f"'{label}' {f'holds text in {values} lines' if values else 'is empty'}, no channel")
+        else:
+            clocks.append(Clock(label, label, seconds_since_first(values, dated=kind == "dates")))
+    statements = rate_statements(table["preamble"], notes, decimal_comma=table["decimal_comma"])
+    form = f"text, {table['delimiter']} between columns" if len(table["columns"]) > 1 else "text, one column"
+    if table["decimal_comma"]:
+        form += ", decimal comma"
+    if table["encoding"] != "UTF-8":
+        form += f", {table['encoding']}"
+    return Contents(form, tuple(series), tuple(clocks), tuple(statements), tuple(notes), nameless)
+
+
+def seconds_since_first(stamps: NDArray[np.int64], *, dated: bool) -> NDArray[np.float64]:
+    """Nanoseconds (n_samples,), the least int64 for none, as seconds since the first entry.
+
+    A time of day without a date that falls by more than half a day has passed midnight.
+    """
+    missing = stamps == np.iinfo(np.int64).min
+    first = stamps[~missing][:1]
+    ns = np.where(missing, 0, stamps - first) if first.size else np.zeros_like(stamps)
+    if not dated and not missing.any():
+        day = 86_400 * 10**9
+        ns = ns + day * np.cumsum(np.diff(ns, prepend=ns[:1]) < -day // 2)
+    # A quotient is rounded once, so that 66 ms become exactly float("0.066").
+    seconds: NDArray[np.float64] = ns / 1e9
+    seconds[missing] = math.nan
+    return seconds
+
+
+def rate_statements(preamble: list[str], notes: list[str], *, decimal_comma: bool = False) -> list[RateStatement]:
+    """Sampling rates and intervals stated in lines of text; several values on a line hold for one channel each."""
+    mark = "," if decimal_comma else "."
+    patterns = ((_statement(_RATE_KEY, _HERTZ, mark), _HERTZ), (_statement(_STEP_KEY, _SECOND, mark), _SECOND))
+    over_time = not any(re.match(r"x_dimension\b(?!.*time)", line, re.IGNORECASE) for line in preamble)
+    statements: list[RateStatement] = []
+    for pattern, units in patterns:
+        for line in preamble:
+            for found in pattern.finditer(line):
+                key = found["key"].strip()
+                unit = (found["unit"] or found["behind"] or found["cell"] or "").strip().lower()
+                factor = units.get(unit) if unit else 1.0
+                # A unit of another kind (mm/s) makes it a statement of something else.
+                if factor is None or (key.lower().startswith("delta_x") and not over_time):
+                    continue
+                others = re.split(r"[\t;]" if decimal_comma else r"[\t;,]", line[found.end() :])[1:]
+                texts = [found["value"], *(text for text in others if re.fullmatch(_NUMBERS[mark], text.strip()))]
+                for at, text in enumerate(texts):
+                    value = _value(text, decimal_comma=decimal_comma)
+                    if not (math.isfinite(value) and value > 0):
+                        notes.append(f"header '{key}' states {text.strip()}, which was not used")
+                        continue
+                    rate = value * factor if units is _HERTZ else 1 / (value * factor)
+                    statements.append(RateStatement(f"header '{key}'", tidy(rate), str(at) if len(texts) > 1 else None))
+    return _unique(statements)
+
+
+def _value(text: str, *, decimal_comma: bool) -> float:
+    plain = text.strip().lower().replace("d", "e")
+    return float(plain.replace(",", ".") if decimal_comma and plain.count(",") == 1 else plain.replace(",", ""))
+
+
+def _unique(statements: list[RateStatement]) -> list[RateStatement]:
+    """Statements that say the same of all channels, once."""
+    by_source: dict[str, list[RateStatement]] = {}
+    for statement in statements:
+        by_source.setdefault(statement.source, []).append(statement)
+    kept: list[RateStatement] = []
+    for source, group in by_source.items():
+        rates = {statement.rate_hz for statement in group}
+        kept += [RateStatement(source, rates.pop())] if len(rates) == 1 else group
+    return kept

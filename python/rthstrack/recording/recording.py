@@ -1,0 +1,189 @@
+"""Recordings: a file's named channels, with units and one sampling rate."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rthstrack.errors import ChannelError, RecordingError, SettingError
+from rthstrack.units import units_from_names
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from rthstrack.recording.readers.contents import Contents, Series
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Channel:
+    """One channel: `values` (n_samples,), read-only. `path` is its place in the file; `unit` None if not stated."""
+
+    name: str
+    path: str
+    unit: str | None
+    values: NDArray[np.float64] = field(repr=False)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recording:
+    """A file's channels, sampled at `rate_hz` (None if the file does not say) from `start_s` of its own time.
+
+    `rate_source` says in words where the rate comes from, or why there is none. `notes` says what else was found,
+    left out or done; `n_filled` how many samples of which channel (by path) were filled.
+    """
+
+    file: str
+    format: str
+    channels: tuple[Channel, ...]
+    rate_hz: float | None
+    rate_source: str
+    start_s: float
+    notes: tuple[str, ...]
+    n_filled: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
+
+    def __getitem__(self, selector: str) -> Channel:
+        """The channel of this name, path, or `#index`."""
+        return self.channel(selector)
+
+    def channel(self, selector: str) -> Channel:
+        """The channel that `selector` names.
+
+        By exact name or path, else by either without regard to case and blanks, else `#0`, `#1`, ... in the order of
+        `channels` (as `rthstrack channels` lists them). Raises ChannelError if there is none or more than one.
+        """
+        return self.channels[_select(selector, [(c.name, c.path) for c in self.channels], self.file)]
+
+    def scaled(self, factors: Mapping[str, float]) -> Recording:
+        """The recording with some channels multiplied: {selector: factor}.
+
+        A factor other than 1 or -1 makes the unit unknown. Raises SettingError for a factor that is zero or not finite.
+        """
+        channels = list(self.channels)
+        notes = list(self.notes)
+        for selector, factor in factors.items():
+            if not (math.isfinite(factor) and factor != 0):
+                raise SettingError(f"scale of '{selector}': expected a finite number other than zero, found {factor}")
+            old = self.channel(selector)
+            at = self.channels.index(old)
+            if channels[at] is not old:
+                raise SettingError(f"scale: '{selector}' names channel '{old.path}', which is scaled already")
+            unit = old.unit if abs(factor) == 1 else None
+            channels[at] = replace(old, unit=unit, values=_frozen(old.values * factor))
+            notes.append(f"channel '{old.path}' scaled by {factor:g}" + (f" (was in {old.unit})" if old.unit else ""))
+        return replace(self, channels=tuple(channels), notes=tuple(notes))
+
+    def cut(self, start_s: float | None = None, end_s: float | None = None) -> Recording:
+        """The samples from `start_s` up to, but not including, `end_s`, in seconds from the recording's first sample.
+
+        Raises RecordingError without a rate or where nothing is left, SettingError for an impossible range.
+        """
+        if self.rate_hz is None:
+            raise RecordingError(f"{self.file}: cannot cut by time: {self.rate_source}; give --rate HZ")
+        start = 0.0 if start_s is None else start_s
+        end = math.inf if end_s is None else end_s
+        if not (0 <= start < end):
+            raise SettingError(f"cut: expected 0 <= start < end in seconds, found start {start:g}, end {end:g}")
+        longest = max(len(c.values) for c in self.channels)
+        # Products with the rate are rounded: a bound within 1e-6 of a sample is on it.
+        first = math.ceil(min(start * self.rate_hz, longest) - 1e-6)
+        last = math.ceil(min(end * self.rate_hz, longest) - 1e-6)
+        if first >= last:
+            length = longest / self.rate_hz
+            raise RecordingError(
+                f"{self.file}: nothing left between {start:g} and {end:g} s; the recording is {length:g} s long"
+            )
+        notes = [
+            *self.notes,
+            f"cut to {first / self.rate_hz:g} s .. {last / self.rate_hz:g} s ({last - first} samples)",
+        ]
+        if end_s is not None and end_s * self.rate_hz > longest + 1e-6:
+            notes.append(
+                f"the recording ends at {longest / self.rate_hz:g} s, before the end of the cut at {end_s:g} s"
+            )
+        channels = tuple(replace(c, values=_frozen(c.values[first:last].copy())) for c in self.channels)
+        return replace(self, channels=channels, start_s=self.start_s + first / self.rate_hz, notes=tuple(notes))
+
+    def filled(self, max_gap_samples: int) -> Recording:
+        """Gaps of up to `max_gap_samples` NaN or infinite samples replaced by linear interpolation.
+
+        Longer gaps and those at the ends stay. `n_filled` and `notes` say how many samples were filled in each channel.
+        """
+        if max_gap_samples < 1:
+            raise SettingError(f"fill: expected a gap of at least 1 sample, found {max_gap_samples}")
+        channels = []
+        notes = list(self.notes)
+        n_filled = dict(self.n_filled)
+        for old in self.channels:
+            values, n_samples, n_gaps = _filled(old.values, max_gap_samples)
+            if n_samples:
+                n_filled[old.path] = n_filled.get(old.path, 0) + n_samples
+                notes.append(f"channel '{old.path}': {n_samples} samples in {n_gaps} gap(s) filled by interpolation")
+            channels.append(replace(old, values=values))
+        return replace(self, channels=tuple(channels), notes=tuple(notes), n_filled=MappingProxyType(n_filled))
+
+
+def _channels(contents: Contents, series: Sequence[Series]) -> tuple[Channel, ...]:
+    # Units are read from all names together: what x_m means depends on whether there is an x_t.
+    all_names = [s.name for s in contents.series]
+    by_name = dict(zip(all_names, units_from_names(all_names), strict=True))
+    return tuple(Channel(s.name, s.path, s.unit or by_name[s.name], _frozen(s.values)) for s in series)
+
+
+def _frozen(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    values = np.ascontiguousarray(values, dtype=np.float64)
+    values.setflags(write=False)
+    return values
+
+
+def _filled(values: NDArray[np.float64], longest: int) -> tuple[NDArray[np.float64], int, int]:
+    """The values with short gaps interpolated, how many samples that were, and in how many gaps."""
+    missing = ~np.isfinite(values)
+    if not missing.any():
+        return values, 0, 0
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], missing, [False]]).astype(np.int8)))
+    starts, ends = edges[::2], edges[1::2]
+    inner = (starts > 0) & (ends < len(values)) & (ends - starts <= longest)
+    wanted = np.zeros(len(values) + 1, dtype=np.int64)
+    np.add.at(wanted, starts[inner], 1)
+    np.add.at(wanted, ends[inner], -1)
+    gaps = np.cumsum(wanted)[:-1] > 0
+    known = np.flatnonzero(~missing)
+    out = values.copy()
+    out[gaps] = np.interp(np.flatnonzero(gaps), known, values[known])
+    return _frozen(out), int(np.count_nonzero(gaps)), int(np.count_nonzero(inner))
+
+
+def _select(selector: str, channels: Sequence[tuple[str, str]], file: str) -> int:
+    """The index of the one channel, given as (name, path), that a selector names."""
+
+    def loose(text: str) -> str:
+        return re.sub(r"\s+", "", text).casefold()
+
+    matches = [i for i, both in enumerate(channels) if selector in both]
+    if not matches:
+        matches = [i for i, both in enumerate(channels) if loose(selector) in map(loose, both)]
+    if len(matches) == 1:
+        return matches[0]
+    if matches:
+        listed = ", ".join(f"#{i} '{channels[i][1]}'" for i in matches)
+        raise ChannelError(f"{file}: '{selector}' names {len(matches)} channels: {listed}; choose one by #index")
+    listed = ", ".join(f"#{i} '{name}'" for i, (name, _) in enumerate(channels[:20]))
+    listed += f" and {len(channels) - 20} more" if len(channels) > 20 else ""
+    if index := re.fullmatch(r"#(\d{1,9})", selector.strip()):
+        if int(index[1]) < len(channels):
+            return int(index[1])
+        raise ChannelError(
+            f"{file}: no channel '{selector}': there are {len(channels)}, #0 to #{len(channels) - 1}: {listed}"
+        )
+    by_text = {loose(text): i for i, both in enumerate(channels) for text in both}
+    near = dict.fromkeys(by_text[text] for text in difflib.get_close_matches(loose(selector), by_text, n=3))
+    meant = f" (did you mean {' or '.join(repr(channels[i][0]) for i in near)}?)" if near else ""
+    raise ChannelError(f"{file}: no channel '{selector}'{meant}; there are: {listed}")

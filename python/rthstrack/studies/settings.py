@@ -1,0 +1,186 @@
+"""What a study runs over."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rthstrack.errors import SettingError
+from rthstrack.evaluation.factors import TOLERANCE
+from rthstrack.evaluation.inputs import _count, _number
+from rthstrack.evaluation.settings import Settings
+from rthstrack.evaluation.tracking import Evaluator
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+#: P and Q of the paper's sections 3 and 4, each with the other at 1.
+POWERS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)
+#: The largest P and Q that the paper's section 5 combines.
+COMBINED = (64, 32)
+WINDOWS = ("boxcar", "hann")
+WEIGHT_POWERS = (2,)
+
+
+@dataclass(frozen=True, slots=True)
+class StudySettings:
+    """What a study goes over; the words and defaults are those of `study`."""
+
+    P: tuple[int, ...] | None = None
+    Q: tuple[int, ...] | None = None
+    combined: tuple[int, int] | None = None
+    windows: tuple[str, ...] = WINDOWS
+    weight_powers: tuple[int, ...] = WEIGHT_POWERS
+    estimator: str = "fei"
+    decimator: str = "spectral"
+    detrend: str = "none"
+    band_hz: tuple[float, float] | None = None
+    timing: bool = True
+    choose: tuple[str, ...] = ()
+    tolerance: float = TOLERANCE
+    shares: tuple[float, ...] = ()
+    max_delay_s: float = Settings().max_delay_s
+    expected_delay_s: float | None = None
+    noise: str = "white"
+    noise_ratio: float = 0.0
+    bad_samples: str = "leave_out"
+
+    def checked(self) -> StudySettings:
+        """The same with the defaults filled in; raises SettingError for what is impossible whatever the source."""
+        defaults = self.combined is None and self.P is None and self.Q is None
+        combined = COMBINED if defaults else _combined(self.combined)
+        windows = _several("windows", (self.windows,) if isinstance(self.windows, str) else self.windows)
+        powers = tuple(_count("weight_power", power) for power in _several("weight_powers", self.weight_powers))
+        base = self._base()._checked()
+        _check_band(base.band_hz)
+        tolerance = _number("tolerance", self.tolerance)
+        if not 0 < tolerance < 1:
+            raise SettingError(f"tolerance must be a number between 0 and 1, both excluded, not {tolerance:g}")
+        choose, shares = _named_factors(self.choose), _shares(self.shares)
+        for what, needed, found in (
+            ("spectral decimator", "spectral", base.decimator),
+            ("estimator fei", "fei", base.estimator),
+        ):
+            if (choose or shares) and found != needed:
+                raise SettingError(f"P and Q are chosen, and key frequencies taken, for the {what} only, not {found}")
+        whole = StudySettings(
+            _powers_of_two("P", POWERS if self.P is None else self.P),
+            _powers_of_two("Q", POWERS if self.Q is None else self.Q),
+            combined,
+            windows,
+            powers,
+            base.estimator,
+            base.decimator,
+            base.detrend,
+            base.band_hz,
+            bool(self.timing),
+            choose,
+            tolerance,
+            shares,
+            base.max_delay_s,
+            base.expected_delay_s,
+            base.noise,
+            base.noise_ratio,
+            base.bad_samples,
+        )
+        for kind in whole._kinds():
+            Evaluator(1024, 1.0, dataclasses.replace(kind, band_hz=None))
+        if not whole._grid():
+            raise SettingError(
+                f"no cell is left: P {_listed(whole.P)} with Q {_listed(whole.Q)}, combined up to {combined}"
+            )
+        return whole
+
+    def _base(self) -> Settings:
+        """What all cells share."""
+        return Settings(
+            self.estimator,
+            decimator=self.decimator,
+            detrend=self.detrend,
+            band_hz=self.band_hz,
+            max_delay_s=self.max_delay_s,
+            expected_delay_s=self.expected_delay_s,
+            noise=self.noise,
+            noise_ratio=self.noise_ratio,
+            bad_samples=self.bad_samples,
+        )
+
+    def _grid(self) -> list[tuple[int, int]]:
+        most_p, most_q = self.combined or (math.inf, math.inf)
+        return [(p, q) for p in self.P or () for q in self.Q or () if p == 1 or q == 1 or (p <= most_p and q <= most_q)]
+
+    def _kinds(self) -> list[Settings]:
+        """The settings of each window with each weight power, at P = Q = 1."""
+        base = self._base()
+        return [
+            dataclasses.replace(base, window=window, weight_power=power)._checked()
+            for window in self.windows
+            for power in self.weight_powers
+        ]
+
+
+def _several(name: str, values: Iterable[Any]) -> tuple[Any, ...]:
+    """The values, at least one and none twice."""
+    try:
+        listed = tuple(values)
+    except TypeError:
+        raise SettingError(f"{name} must be a list of values, found {values!r}") from None
+    if not listed:
+        raise SettingError(f"{name} is empty: give at least one value")
+    for value in listed:
+        if listed.count(value) > 1:
+            raise SettingError(f"{name} holds {value!r} twice: give every value once")
+    return listed
+
+
+def _powers_of_two(name: str, values: Iterable[Any]) -> tuple[int, ...]:
+    numbers = []
+    for value in _several(name, values):
+        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1 or value & (value - 1):
+            raise SettingError(f"{name} must hold powers of two (1, 2, 4, ...), found {value!r}")
+        numbers.append(_count(name, value))
+    return tuple(sorted(numbers))
+
+
+def _combined(limits: Any) -> tuple[int, int] | None:
+    if limits is None:
+        return None
+    try:
+        most_p, most_q = limits
+    except (TypeError, ValueError):
+        raise SettingError(
+            f"combined must be the largest P and Q taken together, two numbers, not {limits!r}"
+        ) from None
+    return _count("combined P", most_p), _count("combined Q", most_q)
+
+
+def _named_factors(choose: Any) -> tuple[str, ...]:
+    names = tuple(choose)
+    for name in names:
+        if name not in ("P", "Q"):
+            raise SettingError(f"choose takes P and Q, found {name!r}")
+    return tuple(sorted(set(names)))
+
+
+def _shares(shares: Any) -> tuple[float, ...]:
+    numbers = tuple(_number("share", share) for share in shares)
+    for share in numbers:
+        if not 0 < share <= 1:
+            raise SettingError(f"share must be above 0 and at most 1, not {share:g}")
+        if numbers.count(share) > 1:
+            raise SettingError(f"shares hold {share:g} twice: give every value once")
+    return numbers
+
+
+def _check_band(band_hz: tuple[float, float] | None) -> None:
+    """An impossible band is misuse; one that merely leaves no bin is a result."""
+    if band_hz is not None and not 0 <= band_hz[0] <= band_hz[1] < math.inf:
+        raise SettingError(f"band_hz must be 0 <= low <= high in Hz, found {band_hz[0]:g} to {band_hz[1]:g}")
+
+
+def _listed(values: Iterable[object] | None) -> str:
+    return ", ".join(map(str, values or ()))

@@ -1,0 +1,284 @@
+"""Which of two estimates to use, and why, in one sentence."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rthstrack.verdict.difference import _differences
+from rthstrack.verdict.sentence import _percent, _undetermined
+from rthstrack.verdict.variation import _MINOR_CHANGE, _in_words, _varying, _varying_slowly
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from rthstrack.evaluation.dependence import Dependence
+    from rthstrack.evaluation.response import FrequencySlopes
+    from rthstrack.evaluation.tracking import Tracking
+
+# An interval that reaches further than this share of the delay to either side says little of it.
+_WIDE_INTERVAL = 0.1
+# A change of one setting is the cause of a difference when it leaves less than this share of it; what is computed from
+# the spectrum alone, without a trial, when it leaves less than that.
+_EXPLAINED, _FORETOLD = 0.5, 0.2
+# Of two causes in one, less than this share of the difference is not told.
+_MINOR = 0.25
+# A bin that holds so many times what noise leaves in it on average holds motion.
+_CLEAR_OF_NOISE = 16.0
+# Ends this near to the mean, in standard deviations, are no cause.
+_AT_MEAN = 0.1
+
+# What to do where the reason itself does not say.
+_ADVICE = {
+    "too little motion to judge by": "; are these the right channels?",
+    "the iteration did not settle on a delay": "; judge only the frequencies at which target moves (--band)",
+    "measured moves against target": " (--scale CHANNEL=-1 turns one round)",
+}
+_NAMES = {
+    "fei": "the published average",
+    "aligned": "the aligned average",
+    "least_squares": "least squares as asked for",
+}
+
+
+def argument(
+    target: NDArray[np.float64],
+    tracking: Tracking,
+    trusted: Tracking,
+    depends: Dependence | None,
+    slopes: FrequencySlopes | None,
+    variants: Mapping[str, Tracking],
+    found: Mapping[str, str],
+    unit: str | None = None,
+    start_s: float = 0.0,
+) -> tuple[str, str | None]:
+    """In one sentence, which number to use and why; and the name of that warning of `found` which it says itself.
+
+    `tracking` is the estimate asked for, with weights; `variants` are the same with one setting changed. `unit` is
+    target's; `start_s` the time of the first sample.
+    """
+    if (missing := _undetermined(trusted)) is not None:
+        said = "no number can be trusted here" if _undetermined(tracking) is None else "there is no number to use"
+        return f"{said}: {_advised(missing, trusted)}", None
+    if (missing := _undetermined(tracking)) is not None:
+        asked_for = _NAMES[tracking.settings.estimator]
+        return f"use the trusted estimate: {asked_for} is not determined: {missing}", None
+    if depends is not None and (varying := _varying(depends, unit, start_s)) is not None:
+        name, text = varying
+        return f"{text}; {_averages(tracking, trusted, name)}", "delay spread"
+    if depends is None or depends.kind == "frequency":
+        slowly = _varying_slowly(slopes)
+    else:
+        said = _in_words(depends, unit, start_s, _MINOR_CHANGE)
+        slowly = f"; {said}" if said else ""
+    if tracking is trusted:
+        interval = "with its interval" if not trusted.reason else f"for which there is {trusted.reason}"
+        return f"this is the trusted estimate, {interval}{slowly}", None
+    ours = _NAMES[tracking.settings.estimator]
+    which = _differences(tracking, trusted)
+    if not which:
+        return f"{ours} agrees with the trusted estimate {_how_well(tracking, trusted)}{slowly}", None
+    causes = [_cause(target, tracking, trusted, name, variants, found) for name in which]
+    if len({change for change, _, _ in causes}) == 1:
+        # One cause, told of the number that is off by most.
+        at = max(range(len(which)), key=lambda i: _relative(which[i], tracking, trusted))
+        gaps = [f"{' and '.join(_gap(name, tracking, trusted) for name in which)}, {causes[at][2]}"]
+    else:
+        gaps = [f"{_gap(name, tracking, trusted)}, {text}" for name, (_, _, text) in zip(which, causes, strict=True)]
+    # What follows the target is told by how gain and delay change.
+    without = f"; {trusted.reason}" if trusted.reason and "follows target" not in str(trusted.reason) else ""
+    told = next((warning for _, warning, _ in causes if warning is not None), None)
+    return f"use the trusted estimate: {ours} is {', and '.join(gaps)}{slowly}{without}", told
+
+
+def _advised(missing: str, trusted: Tracking) -> str:
+    """Why there is no number, with what to do about it in the command's words."""
+    settings, quarter_s = trusted.settings, trusted.n_samples / trusted.rate_hz / 4
+    if missing.startswith("the delay seems to lie beyond"):
+        if settings.max_delay_s < quarter_s:
+            most = min(2 * settings.max_delay_s, quarter_s)
+            return f"the delay seems to lie beyond max_delay_s, {settings.max_delay_s:g} s: try --max-delay {most:.3g}"
+        return f"the delay seems to lie beyond a quarter of the record, {quarter_s:.3g} s: a longer one is needed"
+    return missing + next((advice for known, advice in _ADVICE.items() if missing.startswith(known)), "")
+
+
+def _how_well(tracking: Tracking, trusted: Tracking) -> str:
+    if trusted.reason:
+        return f"to a hundredth ({trusted.reason})"
+    inside = all(
+        low <= ours <= high
+        for ours, (low, high) in (
+            (float(tracking.delay_s), trusted.delay_interval_s),
+            (float(tracking.amplitude), trusted.amplitude_interval),
+        )
+    )
+    if not inside:
+        return "to a thousandth"
+    low, high = (1e3 * float(end) for end in trusted.delay_interval_s)
+    if (high - low) / 2 > _WIDE_INTERVAL * 1e3 * abs(float(trusted.delay_s)):
+        return f"within its interval, but that is wide: {low:.2g} to {high:.2g} ms"
+    return "within its interval"
+
+
+def _averages(tracking: Tracking, trusted: Tracking, name: str = "delay_s") -> str:
+    """What single numbers are worth where gain or delay change."""
+
+    def text(t: Tracking) -> str:
+        value = float(getattr(t, name))
+        return f"{1e3 * value:.3g} ms" if name == "delay_s" else f"{value:.3g}"
+
+    if tracking is trusted or name not in _differences(tracking, trusted):
+        return f"{text(trusted)} is an average of it"
+    which = {"fei": "published", "aligned": "aligned"}.get(tracking.settings.estimator, "as asked for")
+    return f"{text(tracking)} ({which}) and {text(trusted)} (trusted) are two averages of it"
+
+
+def _gap(name: str, tracking: Tracking, trusted: Tracking) -> str:
+    """How far the estimate is from the trusted one: 0.026 ms below, 1.2 % above."""
+    ours, theirs = float(getattr(tracking, name)), float(getattr(trusted, name))
+    where = "above" if ours > theirs else "below"
+    if name == "delay_s":
+        return f"{_percent(1e3 * abs(ours - theirs))} ms {where}"
+    return f"{_percent(100 * abs(ours / theirs - 1))} % {where} in amplitude"
+
+
+def _relative(name: str, tracking: Tracking, trusted: Tracking) -> float:
+    """By how much a number is off, as a share of the trusted one."""
+    known = float(getattr(trusted, name))
+    return abs(float(getattr(tracking, name)) / known - 1) if known else math.inf
+
+
+def _cause(
+    target: NDArray[np.float64],
+    tracking: Tracking,
+    trusted: Tracking,
+    name: str,
+    variants: Mapping[str, Tracking],
+    found: Mapping[str, str],
+) -> tuple[str | None, str | None, str]:
+    """Why one number misses the trusted one: what is to blame, the warning that says it, and the cause in words.
+
+    Each suspect is tried: what is left of the difference without it?
+    """
+    ours, theirs = float(getattr(tracking, name)), float(getattr(trusted, name))
+    readings = {change: float(getattr(variant, name)) for change, variant in variants.items()}
+    if (averaged := _averaged(target, tracking, trusted, name)) is not None:
+        # What averaging makes of a constant gain and delay, target's own noise and all, is taken off.
+        readings["average"] = ours - averaged[1] + theirs
+    remains = {change: abs(reading - theirs) / abs(ours - theirs) for change, reading in readings.items()}
+    if remains.get("bad samples", 1.0) < _EXPLAINED and "bad samples" in found:
+        # All else that is tried still holds them.
+        return "bad samples", "bad samples", f"as {found['bad samples'].partition('; left out')[0]}"
+    suspects = [change for change in ("detrend", "window", "band") if remains.get(change, 1.0) < _EXPLAINED]
+    if remains.get("average", 1.0) < _FORETOLD:
+        suspects.append("average")
+    # Another average only tells that the difference is made before averaging, so it is the last to be asked.
+    if not suspects and remains.get("estimator", 1.0) < _EXPLAINED:
+        suspects = ["estimator"]
+    if not suspects:
+        return None, None, "which neither drift, window, noise nor wide phases explain alone"
+    # Noise on target that is there, and explains it, needs no help by the record's ends.
+    noisy = "target noise" in found
+    by_bins = "average" in suspects or "band" in suspects
+    if noisy and not by_bins and averaged is not None and abs(ours - averaged[1]) < _EXPLAINED * abs(ours - theirs):
+        return "target noise", None, "as target's own noise counts as motion"
+    first = [name for name in ("average", "band") if name in suspects and (noisy or name == "average")]
+    cause = first[0] if first else min(suspects, key=remains.__getitem__)
+    by_noise = 0.0
+    if cause == "average" and averaged is not None:
+        clean = averaged[0]
+        by_noise = (averaged[1] - clean) / (averaged[1] - theirs)
+        if by_noise > 1 - _MINOR and "band" in suspects:
+            cause = "band"  # the same, with a remedy
+    if cause == "average":
+        noise = "target's own noise counts as motion"
+        if by_noise > 1 - _MINOR:
+            return "target noise", None, f"as {noise}"
+        frequency, weights = _of_motion(target, tracking, trusted)
+        low, high = (360 * abs(float(trusted.delay_s)) * edge for edge in _middle(frequency, weights))
+        said = f"as it averages phases that spread from {_percent(low)} to {_percent(high)} degrees"
+        if low > 180:
+            said = f"as it takes phases of {low:.0f} to {high:.0f} degrees for less than half a turn"
+        return cause, None, said if by_noise < _MINOR else f"{said}, and {noise}"
+    window = tracking.settings.window
+    scale, unit = (1e3, " ms") if name == "delay_s" else (1.0, "")
+    reading = f"it reads {'d' if unit else 'A'} = {scale * readings[cause]:.4g}{unit}"
+    if cause == "estimator":
+        where = "its two ends act" if window == "boxcar" else f"the {window} window acts"
+        return cause, None, f"as {where} on different points of both motions: with --estimator aligned {reading}"
+    if cause == "band":
+        low, high = variants["band"].settings.band_hz or (0.0, math.inf)
+        warning = "noise" if "noise" in found else None
+        return (
+            cause,
+            warning,
+            f"as noise above {high:.3g} Hz counts as motion: with --band {low:g} {high:.3g} {reading}",
+        )
+    remedy = (
+        f"--detrend {variants[cause].settings.detrend}"
+        if cause == "detrend"
+        else f"--window {variants[cause].settings.window}"
+    )
+    if cause == "window" and window != "boxcar":
+        return cause, None, f"as the {window} window acts on different points of both motions: with {remedy} {reading}"
+    if "offset" in found:
+        return cause, "offset", f"as {found['offset']}: with {remedy} {reading}"
+    if "drift" in found:
+        return cause, "drift", f"as {found['drift'].partition(': try')[0]}: with {remedy} {reading}"
+    return cause, None, f"as {_ends_apart(target)}: with {remedy} {reading}"
+
+
+def _middle(frequency: NDArray[np.float64], weights: NDArray[np.float64]) -> tuple[float, float]:
+    """The frequencies between which the middle nine tenths of the weight lie."""
+    share = np.cumsum(weights)
+    first, last = np.searchsorted(share, (0.05 * share[-1], 0.95 * share[-1])).clip(max=share.size - 1)
+    return float(frequency[first]), float(frequency[last])
+
+
+def _ends_apart(target: NDArray[np.float64]) -> str:
+    """Where the record starts and ends, in standard deviations of the target from its mean."""
+    n = max(1, target.size // 50)
+    mean, spread = float(target.mean()), float(target.std())
+    first, last = (float(part.mean() - mean) / spread for part in (target[:n], target[-n:]))
+    if max(abs(first), abs(last)) < _AT_MEAN:
+        return "its two ends act on different points of both motions"
+    return (
+        f"target does not begin and end at its mean ({first:+.2g} and {last:+.2g} standard deviations), "
+        "which acts on it and on measured at different points of the motion"
+    )
+
+
+def _of_motion(
+    target: NDArray[np.float64], tracking: Tracking, trusted: Tracking
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The bins' frequencies, and their weights less what the target's own noise, taken for white, adds to each."""
+    frequency, weights = tracking.frequency_hz, tracking.weights
+    assert frequency is not None
+    assert weights is not None
+    if not float(trusted.target_noise_std) > 0 or tracking.settings.weight_power != 2:
+        return frequency, weights
+    share = (float(trusted.target_noise_std) / float(target.std())) ** 2
+    noise = share * tracking.delta_f_hz / (tracking.rate_hz / 2)
+    return frequency, np.where(weights > _CLEAR_OF_NOISE * noise, weights - noise, 0.0)
+
+
+def _averaged(
+    target: NDArray[np.float64], tracking: Tracking, trusted: Tracking, name: str
+) -> tuple[float, float] | None:
+    """What the published average makes of the trusted number, were it the same at every frequency.
+
+    Without the target's own noise, and with it: it weighs bins that hold nothing else.
+    """
+    if tracking.settings.estimator != "fei":
+        return None
+    frequency, motion = _of_motion(target, tracking, trusted)
+    turned = complex((motion * np.exp(-2j * np.pi * float(trusted.delay_s) * frequency)).sum())
+    if name == "amplitude":
+        noisy = abs(turned) * float(trusted.amplitude)
+        return noisy / float(motion.sum()), noisy
+    delay = -float(np.angle(turned)) / (2 * math.pi)
+    return delay * float(motion.sum() / (motion * frequency).sum()), delay / float(tracking.equivalent_frequency_hz)

@@ -1,0 +1,364 @@
+"""Everything that is known of one target/measured pair, as plain frozen data.
+
+The command, the report and the figures take an `Assessment` and compute nothing themselves.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from rthstrack.errors import SettingError, SignalError
+from rthstrack.evaluation.dependence import dependence
+from rthstrack.evaluation.factors import TOLERANCE, choose_factors
+from rthstrack.evaluation.indices import index_histories, indices
+from rthstrack.evaluation.inputs import _number, _single
+from rthstrack.evaluation.response import frequency_response, frequency_slopes
+from rthstrack.evaluation.settings import Settings
+from rthstrack.evaluation.tracking import Evaluator, bridged, evaluate_moving
+from rthstrack.verdict.argument import argument as argued
+from rthstrack.verdict.difference import differ
+from rthstrack.verdict.display import signal_roles
+from rthstrack.verdict.limits import Limits, exceeded, unchecked
+from rthstrack.verdict.sentence import reason, sentence, still_in_band, with_cause
+from rthstrack.verdict.warnings import warnings as found_warnings
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping
+
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
+
+    from rthstrack.evaluation.dependence import Dependence
+    from rthstrack.evaluation.factors import Factors
+    from rthstrack.evaluation.indices import IndexHistories, Indices
+    from rthstrack.evaluation.response import FrequencyResponse, FrequencySlopes
+    from rthstrack.evaluation.tracking import MovingTracking, Tracking
+
+#: Length of a moving window unless told otherwise, in seconds, but never more than a quarter of the record.
+MOVING_S = 4.0
+#: Readings a window's length.
+READINGS_PER_WINDOW = 16
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Assessment:
+    """One pair, judged.
+
+    `part` is "whole" (target to measured), "compensator" (target to command) or "actuator" (command to measured).
+    `target` and `measured` are the raw samples, `unit` theirs; `time_s` starts at the recording's own start.
+    `settings` holds what was done before the evaluation (cut, fill, resample, scale, rate and where it came from)
+    and the evaluation's own settings. `exceeded` names each limit that was exceeded, in one sentence.
+    `tracking`, `moving` are of the estimator asked for; `trusted`, `trusted_moving` of least squares on every sample,
+    the same object where that was asked for. `variants`: where both differ, `tracking` with one setting changed, by
+    what was changed ("detrend", "window", "band", "estimator"). `argument` says in one sentence which to use, and why.
+    """
+
+    file: str
+    actuator: int
+    part: str
+    target_name: str
+    measured_name: str
+    unit: str | None
+    rate_hz: float
+    start_s: float
+    target: NDArray[np.float64] = field(repr=False)
+    measured: NDArray[np.float64] = field(repr=False)
+    tracking: Tracking  # evaluated with weights=True: spectra and weights inside
+    moving: MovingTracking | None
+    moving_note: str | None  # why there is no moving evaluation, when there is none
+    trusted: Tracking
+    trusted_moving: MovingTracking | None  # over the same windows
+    variants: Mapping[str, Tracking]
+    response: FrequencyResponse | None  # aligned at the slopes' delay, or the trusted one
+    response_note: str | None
+    slopes: FrequencySlopes | None
+    slopes_note: str | None
+    depends_on: str | None
+    dependence: Dependence | None
+    indices: Indices
+    histories: IndexHistories
+    settings: dict[str, Any]
+    verdict: str
+    argument: str
+    warnings: tuple[str, ...]
+    limits: Limits
+    exceeded: tuple[str, ...]
+    factors: Factors | None = None  # P and Q with their bound, where the program chose them
+
+
+def assess(
+    target: ArrayLike,
+    measured: ArrayLike,
+    rate_hz: float,
+    *,
+    settings: Settings | None = None,
+    choose: Collection[str] = (),
+    tolerance: float = TOLERANCE,
+    moving_s: float | None = None,
+    hop_s: float | None = None,
+    limits: Limits | None = None,
+    file: str = "",
+    actuator: int = 0,
+    part: str = "whole",
+    target_name: str = "target",
+    measured_name: str = "measured",
+    unit: str | None = None,
+    measured_unit: str | None = None,
+    start_s: float = 0.0,
+    origin: Mapping[str, Any] | None = None,
+) -> Assessment:
+    """Judges one pair in every way there is: whole record, moving windows, over frequency, indices, warnings.
+
+    target, measured: (n_samples,) in `unit` (and `measured_unit`, the same unless given); settings: of `evaluate`;
+    their expected_delay_s is the trusted estimate's too, and its alone where the estimator is "fei".
+    choose: "P", "Q" or both are chosen within `tolerance` (`choose_factors`), in place of those in settings. They fit
+    the whole record only: moving windows have 1 in their place.
+    moving_s, hop_s: moving windows; by default 4 s but at most a quarter of the record, sixteen readings a window.
+    limits: apply to |delay| and |amplitude - 1|. `origin` says what was done to the samples before.
+
+    Raises SignalError, SettingError; where only the moving evaluation or the frequency response is impossible, it is
+    None and its note says why, unless `moving_s` or `hop_s` asked for it.
+    """
+    asked_for = settings or Settings()
+    settings = without_trusted(asked_for)
+    t, m = _single(target, measured)
+    rate_hz = _number("rate_hz", rate_hz)
+    if not t.size:
+        raise SignalError("there are no samples to judge: both channels are empty")
+    factors = _chosen(t, m, rate_hz, settings, choose, tolerance) if choose else None
+    for_record = settings if factors is None else factors.settings
+    tracking = Evaluator(t.size, rate_hz, for_record).evaluate(t, m, weights=True)
+    still = still_in_band(t, tracking)
+    if still is not None:
+        tracking = _without_numbers(tracking, still)
+    for_windows = tracking.settings if factors is None else factors.reference.settings
+    asked = moving_s is not None or hop_s is not None
+    window_s = min(MOVING_S, t.size / rate_hz / 4) if moving_s is None else moving_s
+    hop_s = max(window_s / READINGS_PER_WINDOW, 1 / rate_hz) if hop_s is None else hop_s
+    trusted_settings = _trusted(for_record, asked_for.expected_delay_s)
+    trusted = tracking
+    if tracking.settings != trusted_settings:
+        trusted = Evaluator(t.size, rate_hz, trusted_settings).evaluate(t, m)
+        if still is not None:
+            trusted = _without_numbers(trusted, still)
+    moving, trusted_moving, moving_note = None, None, None
+    try:
+        moving = _moving(t, m, rate_hz, window_s, hop_s, for_windows)
+        trusted_moving = moving
+        if moving.settings != trusted_settings:
+            trusted_moving = _moving(t, m, rate_hz, window_s, hop_s, trusted_settings)
+    except (SettingError, SignalError) as error:
+        if asked:
+            raise type(error)(f"moving windows of {window_s:g} s: {error}") from None
+        moving, trusted_moving, moving_note = None, None, f"not determined: {error}"
+    # Curves over frequency and what gain and delay depend on need every sample.
+    raw, without_bad = (t, m), tracking
+    if trusted.bad_samples:
+        t, m = bridged(t, m, rate_hz, trusted)
+        without_bad = Evaluator(t.size, rate_hz, for_record).evaluate(t, m, weights=True)
+    slopes, slopes_note = None, None
+    # Where one delay explains measured, segments are aligned at it: bursts and drift would lead the search for another.
+    explained = math.isfinite(float(trusted.delay_interval_s[0]))
+    try:
+        slopes = frequency_slopes(
+            t, m, rate_hz, band_hz=for_record.band_hz, align_s=float(trusted.delay_s) if explained else None
+        )
+    except (SettingError, SignalError) as error:
+        slopes_note = f"not determined: {error}"
+    response, response_note = _response(t, m, rate_hz, slopes, trusted)
+    depends = dependence(t, m, without_bad, trusted, response)
+    t, m = raw
+    same, trusted = tracking is trusted, with_cause(trusted, depends)
+    if same:
+        tracking = trusted
+    limits = limits or Limits()
+    names = (target_name, measured_name)
+    units = (unit, measured_unit or unit)
+    found_indices = indices(t, m, rate_hz)
+    warnings = found_warnings(
+        t, m, tracking, trusted, moving, response, found_indices.rms_error_percent, depends, units, names
+    )
+    suspect = "mean" if "offset" in warnings and "drift" not in warnings else "linear"
+    variants = _variants(t, m, tracking, trusted_settings, slopes, suspect) if differ(tracking, trusted) else {}
+    if without_bad is not tracking:
+        variants["bad samples"] = without_bad
+    argument, said = argued(t, tracking, trusted, depends, slopes, variants, warnings, unit, start_s)
+    evaluation = dataclasses.asdict(tracking.settings) | _factor_settings(factors)
+    evaluation["expected_delay_s"] = trusted_settings.expected_delay_s
+    return Assessment(
+        file=file,
+        actuator=actuator,
+        part=part,
+        target_name=target_name,
+        measured_name=measured_name,
+        unit=unit,
+        rate_hz=tracking.rate_hz,
+        start_s=start_s,
+        target=t,
+        measured=m,
+        tracking=tracking,
+        moving=moving,
+        moving_note=moving_note,
+        trusted=trusted,
+        trusted_moving=trusted_moving,
+        variants=variants,
+        response=response,
+        response_note=response_note,
+        slopes=slopes,
+        slopes_note=slopes_note,
+        depends_on=None if depends is None else depends.kind,
+        dependence=depends,
+        indices=found_indices,
+        histories=index_histories(t, m, rate_hz),
+        settings=evaluation | {"moving_s": window_s, "hop_s": hop_s} | dict(origin or {}),
+        verdict=sentence(tracking, *signal_roles(part)),
+        argument=argument,
+        warnings=(
+            *unchecked(tracking, limits),
+            *(text for name, text in warnings.items() if name != said),
+        ),
+        limits=limits,
+        exceeded=exceeded(tracking, limits),
+        factors=factors,
+    )
+
+
+def _without_numbers(tracking: Tracking, why: str) -> Tracking:
+    """The same without gain and delay, for a reason that the estimate itself did not see."""
+    names = ("amplitude", "phase_rad", "delay_s", "amplitude_std", "delay_std_s")
+    nothing: dict[str, Any] = dict.fromkeys(names, math.nan)
+    interval = (math.nan, math.nan)
+    return dataclasses.replace(tracking, **nothing, amplitude_interval=interval, delay_interval_s=interval, reason=why)
+
+
+def without_trusted(settings: Settings) -> Settings:
+    """The settings of the estimator asked for, without what speaks of the trusted estimate beside it."""
+    return dataclasses.replace(settings, expected_delay_s=None) if settings.estimator == "fei" else settings
+
+
+def _trusted(settings: Settings, expected_delay_s: float | None) -> Settings:
+    """Least squares on every sample, with the same window and band; two sensors are never assumed to share a zero."""
+    return dataclasses.replace(
+        settings,
+        estimator="least_squares",
+        data_decimation=1,
+        frequency_decimation=1,
+        decimator="spectral",
+        weight_power=2,
+        detrend="linear" if settings.detrend == "linear" else "mean",
+        expected_delay_s=expected_delay_s,
+    )._checked()
+
+
+def _moving(
+    target: NDArray[np.float64],
+    measured: NDArray[np.float64],
+    rate_hz: float,
+    window_s: float,
+    hop_s: float,
+    settings: Settings,
+) -> MovingTracking:
+    return evaluate_moving(target, measured, rate_hz, window_s=window_s, hop_s=hop_s, **dataclasses.asdict(settings))
+
+
+def _response(
+    target: NDArray[np.float64],
+    measured: NDArray[np.float64],
+    rate_hz: float,
+    slopes: FrequencySlopes | None,
+    trusted: Tracking,
+) -> tuple[FrequencyResponse | None, str | None]:
+    """Gain and delay over frequency, segments aligned by what is known of the delay, or why there are none."""
+    if slopes is not None:
+        known_s, dispersion = slopes.align_s, slopes.dispersion
+    else:
+        known_s, dispersion = float(trusted.delay_s), False
+    note, unaligned = None, "" if math.isfinite(known_s) else str(reason(trusted) or "")
+    # A record may be long enough for segments, but not for segments that are moved.
+    for align_s in (known_s, 0.0) if math.isfinite(known_s) else (0.0,):
+        try:
+            found = frequency_response(target, measured, rate_hz, align_s=align_s, dispersion=dispersion)
+        except (SettingError, SignalError) as error:
+            note, unaligned = f"not determined: {error}", str(error)
+            continue
+        return dataclasses.replace(found, unaligned=unaligned), None
+    return None, note
+
+
+def _variants(
+    target: NDArray[np.float64],
+    measured: NDArray[np.float64],
+    tracking: Tracking,
+    trusted: Settings,
+    slopes: FrequencySlopes | None,
+    detrend: str,
+) -> dict[str, Tracking]:
+    """The evaluation with one thing changed, each a suspect where it and the trusted estimate differ."""
+    settings = tracking.settings
+    changes: dict[str, dict[str, Any]] = {
+        "window": {"window": "hann" if settings.window == "boxcar" else "boxcar"},
+        "estimator": {
+            "estimator": "aligned",
+            "data_decimation": 1,
+            "frequency_decimation": 1,
+            "decimator": "spectral",
+            "expected_delay_s": trusted.expected_delay_s,
+        },
+    }
+    if settings.detrend == "none" or (settings.detrend == "mean" and detrend == "linear"):
+        changes["detrend"] = {"detrend": detrend}
+    if slopes is not None:
+        low, high = settings.band_hz or (0.0, math.inf)
+        changes["band"] = {"band_hz": (low, min(high, slopes.band_hz[1]))}
+    found = {}
+    for name, change in changes.items():
+        try:
+            found[name] = Evaluator(target.size, tracking.rate_hz, settings, **change).evaluate(target, measured)
+        except (SettingError, SignalError):
+            continue  # nothing is left to judge by: no suspect
+    return found
+
+
+def _chosen(
+    target: NDArray[np.float64],
+    measured: NDArray[np.float64],
+    rate_hz: float,
+    settings: Settings,
+    choose: Collection[str],
+    tolerance: float,
+) -> Factors:
+    if unknown := [name for name in choose if name not in ("P", "Q")]:
+        raise SettingError(f"choose takes P and Q, not {unknown[0]!r}")
+    given = dataclasses.asdict(settings)
+    p, q = given.pop("data_decimation"), given.pop("frequency_decimation")
+    return choose_factors(
+        target,
+        measured,
+        rate_hz,
+        tolerance=tolerance,
+        data_decimation=None if "P" in choose else p,
+        frequency_decimation=None if "Q" in choose else q,
+        **given,
+    )
+
+
+def _factor_settings(factors: Factors | None) -> dict[str, Any]:
+    """What was chosen and the bound it keeps to, for `Assessment.settings`; nothing where nothing was chosen."""
+    if factors is None:
+        return {}
+    reference = factors.reference.settings
+    return {
+        "chosen_factors": {
+            "tolerance": factors.tolerance,
+            "amplitude_bound": factors.amplitude_bound,
+            "delay_bound": factors.delay_bound,
+            "delay_measure": factors.delay_measure,
+            # moving windows are evaluated with these, too
+            "reference_data_decimation": reference.data_decimation,
+            "reference_frequency_decimation": reference.frequency_decimation,
+            "windowed": None if factors.windowed is None else factors.windowed.to_dict(),
+        }
+    }

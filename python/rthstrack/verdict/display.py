@@ -1,0 +1,149 @@
+"""What the report and the figures share: which points to draw, how to write a number, what a signal is called.
+
+Nothing here changes a result; every function only chooses how a result is shown.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from rthstrack.evaluation.tracking import MovingTracking, Tracking
+
+#: Gain and delay are drawn grey where the coherence is below this.
+LOW_COHERENCE = 0.8
+
+#: The part of a record that is shown enlarged, in seconds.
+STRONGEST_S = 4.0
+
+#: What the estimators are called beside each other.
+ESTIMATORS = {"fei": "published", "aligned": "aligned", "least_squares": "least squares"}
+
+_ROLES = {"whole": ("target", "measured"), "compensator": ("target", "command"), "actuator": ("command", "measured")}
+_LENGTHS = {"m", "cm", "mm", "um", "µm", "μm", "in", "inch", "inches", "ft"}
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def signal_roles(part: str) -> tuple[str, str]:
+    """What the two signals of a part are called, for example ("target", "command") for the compensator."""
+    return _ROLES.get(part, ("target", "measured"))
+
+
+def quantity(unit: str | None) -> str:
+    """The quantity that a unit measures, as far as it tells: "Displacement" for a length, else "Signal"."""
+    return "Displacement" if unit is not None and unit.strip().lower() in _LENGTHS else "Signal"
+
+
+def with_unit(name: str, unit: str | None) -> str:
+    """An axis label, "Displacement (mm)"; it says so where the unit is not stated."""
+    return f"{name} ({unit if unit else 'unit not stated'})"
+
+
+def significant(value: float, digits: int = 4) -> str:
+    """A number with so many significant digits: 0.7170, 13.51, 1.234×10⁻⁵; whole numbers stay whole."""
+    if isinstance(value, int | np.integer):
+        return str(int(value))
+    if value == 0:
+        return "0"
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    power = int(exponent)
+    if -4 <= power < 6:
+        return f"{value:.{max(digits - 1 - power, 0)}f}".replace("-", "\N{MINUS SIGN}")
+    mantissa = mantissa.replace("-", "\N{MINUS SIGN}")
+    return f"{mantissa}\N{MULTIPLICATION SIGN}10{str(power).translate(_SUPERSCRIPTS)}"
+
+
+def with_interval(value: float, interval: Sequence[float], unit: str = "") -> str:
+    """A number with its interval, "12.0034 ms (12.0012 to 12.0056)", to the second digit of half the interval's width.
+
+    Never more than seven significant digits, and four where there is no interval.
+    """
+    tail = f" {unit}" if unit else ""
+    if not math.isfinite(value):
+        return "not determined"
+    low, high = (float(end) for end in interval)
+    if not math.isfinite(high - low):
+        return f"{value:.4g}{tail}"
+    most = 6 - math.floor(math.log10(abs(value))) if value else 9
+    half = (high - low) / 2
+    wanted = 1 - int(f"{half:.1e}".split("e")[1]) if half > 0 else most
+    places = max(min(wanted, most), 0)
+    return f"{value:.{places}f}{tail} ({low:.{places}f} to {high:.{places}f})"
+
+
+def reasons(moving: MovingTracking) -> list[tuple[int, str]]:
+    """Why windows have no number or no interval: how many of each kind, most frequent first, and the first's words."""
+    kinds: dict[str, tuple[int, str]] = {}
+    for reason in moving.reason:
+        if reason:
+            kind = re.sub(r"-?\d[\d.]*", "", str(reason))
+            count, first = kinds.get(kind, (0, str(reason)))
+            kinds[kind] = (count + 1, first)
+    return sorted(kinds.values(), key=lambda found: -found[0])
+
+
+def fourier_scale(tracking: Tracking) -> float:
+    """Factor from the plain DFT to the Fourier amplitude in unit*s: the time between the samples transformed."""
+    settings = tracking.settings
+    step = settings.data_decimation if settings.decimator == "chebyshev" else 1
+    return step / tracking.rate_hz
+
+
+def strongest_span(target: NDArray[np.float64], rate_hz: float, span_s: float = STRONGEST_S) -> tuple[int, int]:
+    """First and one-past-last sample of the `span_s` seconds in which the target varies most about their own mean."""
+    n = round(span_s * rate_hz)
+    if n < 1 or n >= target.size:
+        return 0, target.size
+    centred = target - target.mean()
+    sums, squares = (np.concatenate(([0.0], np.cumsum(column))) for column in (centred, centred**2))
+    variation = squares[n:] - squares[:-n] - (sums[n:] - sums[:-n]) ** 2 / n
+    first = int(np.argmax(variation))
+    return first, first + n
+
+
+def judged_range(tracking: Tracking) -> tuple[float, float] | None:
+    """Frequencies (Hz) to show first: those of the middle 98.5 % of the weight, with room on both sides."""
+    frequency, weights = tracking.frequency_hz, tracking.weights
+    if frequency is None or weights is None or frequency.size < 2:
+        return None
+    share = np.cumsum(weights)
+    first, last = np.searchsorted(share, (0.005, 0.99)).clip(max=frequency.size - 1)
+    low, high = frequency[first] / 2, max(frequency[last] * 3, 1.5 * float(tracking.equivalent_frequency_hz))
+    return float(max(low, frequency[0])), float(min(high, frequency[-1]))
+
+
+def even_edges(n: int, n_groups: int) -> NDArray[np.intp]:
+    """Edges of `n_groups` groups of nearly the same number of points."""
+    return np.unique(np.linspace(0, n, n_groups + 1).round().astype(np.intp))
+
+
+def log_edges(n: int, n_groups: int) -> NDArray[np.intp]:
+    """Edges of groups that are about equally wide on a logarithmic axis of the index."""
+    return np.unique(np.concatenate(([0], np.geomspace(1, n, n_groups).round())).astype(np.intp))
+
+
+def extremes(columns: Sequence[NDArray[np.floating]], edges: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Indices of the points to draw: both ends, and in every group each column's minimum and maximum.
+
+    A group with NaN keeps the first of them too, so that a gap stays a gap.
+    """
+    keep = {0, int(edges[-1]) - 1}
+    for column in columns:
+        missing = np.isnan(column)
+        low = np.where(missing, np.inf, column)
+        high = np.where(missing, -np.inf, column)
+        gaps = bool(missing.any())
+        for first, end in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+            keep.add(first + int(low[first:end].argmin()))
+            keep.add(first + int(high[first:end].argmax()))
+            if gaps and math.isnan(column[first:end].sum()):
+                keep.add(first + int(missing[first:end].argmax()))
+    return np.array(sorted(keep), dtype=np.intp)

@@ -1,0 +1,100 @@
+"""The verdict in one sentence, and why there is no number."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rthstrack.evaluation.dependence import Dependence
+    from rthstrack.evaluation.tracking import Tracking
+
+# An amplitude this near to one is called right: no displacement sensor of a test rig is better.
+_RIGHT_AMPLITUDE = 5e-4
+
+# A target is still in a band that holds less than this share of its motion, the step of a converter of 20 bits.
+_STILL = 1e-6
+
+
+def sentence(tracking: Tracking, target: str = "target", measured: str = "measured") -> str:
+    """The verdict, for example: measured lags target by 13.2 ms and is 1.8 % too large, judged at 0.9 Hz."""
+    delay_s, amplitude = float(tracking.delay_s), float(tracking.amplitude)
+    if math.isnan(delay_s):
+        said = _undetermined(tracking)
+        return f"{measured} does not move: it has no delay" if said == _NO_MOTION else f"not determined: {said}"
+    milliseconds = f"{1e3 * abs(delay_s):.3g} ms"
+    if float(f"{1e3 * abs(delay_s):.3g}") == 0:
+        timing = f"{measured} is in time with {target}"
+    else:
+        timing = f"{measured} {'lags' if delay_s > 0 else 'leads'} {target} by {milliseconds}"
+    excess = 100 * (amplitude - 1)
+    if abs(amplitude - 1) < _RIGHT_AMPLITUDE:
+        size = "has the right amplitude"
+    elif amplitude > 2:
+        size = f"is {amplitude:.3g} times as large"
+    else:
+        size = f"is {_percent(abs(excess))} % too {'large' if excess > 0 else 'small'}"
+    return f"{timing} and {size}, judged at {float(tracking.equivalent_frequency_hz):.2g} Hz"
+
+
+_NO_MOTION = "measured does not move"
+
+
+def reason(tracking: Tracking) -> str | None:
+    """Why a number or its interval is missing; None where nothing is, and for the published estimator's intervals."""
+    said = str(tracking.reason)
+    if not said and math.isnan(float(tracking.delay_s)):
+        return f"not determined: {_NO_MOTION}"
+    # So wide that the number means nothing but that.
+    uncertain = _UNCERTAIN.search(said)
+    if uncertain and float(uncertain[1]) > 1e3 * tracking.n_samples / tracking.rate_hz:
+        said = said.replace(uncertain[0], "noise hides the delay altogether")
+    return said or None
+
+
+def with_cause(tracking: Tracking, depends: Dependence | None) -> Tracking:
+    """The same, its reason with the cause that was found: what noise on target leaves follows target, too."""
+    said = str(tracking.reason)
+    if _NOT_CONSTANT not in said:
+        return tracking
+    if depends is not None:
+        over = {"amplitude": "amplitude", "frequency": "frequency"}.get(depends.kind, "time")
+        said = said.replace("over frequency or time", f"over {over}")
+    elif float(tracking.target_noise_std) > 0:
+        said = said.replace(_NOT_CONSTANT, ", as noise on target does")
+    return dataclasses.replace(tracking, reason=said)
+
+
+_NOT_CONSTANT = ", so they are not constant over frequency or time"
+_UNCERTAIN = re.compile(r"noise leaves the delay uncertain by ([\d.]+) ms either way, more than half a turn")
+
+
+def still_in_band(target: NDArray[np.float64], tracking: Tracking) -> str | None:
+    """That target does not move in the band asked for: then gain and delay there are rounding's. Needs the spectra."""
+    band, spectrum = tracking.settings.band_hz, tracking.target_spectrum
+    if band is None or spectrum is None:
+        return None
+    # By Parseval, and the bins that Q leaves out like their neighbours.
+    n = tracking.rate_hz / tracking.delta_f_hz * tracking.settings.frequency_decimation
+    squares = 2 * tracking.settings.frequency_decimation * float(np.sum(np.abs(spectrum) ** 2)) / n
+    if squares > (_STILL * float(target.std())) ** 2 * target.size:
+        return None
+    return f"not determined: target does not move between {band[0]:.3g} and {band[1]:.3g} Hz"
+
+
+def _undetermined(tracking: Tracking) -> str | None:
+    """Why there is no number; None where there is one."""
+    if not math.isnan(float(tracking.delay_s)):
+        return None
+    return (reason(tracking) or "").removeprefix("not determined: ")
+
+
+def _percent(value: float) -> str:
+    """Two digits, and no power of ten: 0.12, 1.8, 44, 100."""
+    return f"{value:.0f}" if value >= 9.95 else f"{value:.2g}"
