@@ -11,6 +11,7 @@ BIN := .venv/bin
 OUT := build
 PEERS := $(OUT)/peers
 PREFIX ?= /usr/local
+SCRIPTS := $(filter-out %.min.js,$(wildcard python/rthstrack/assets/*.js python/rthstrack/assets/*/*.js))
 # One interpreter for every cargo command: with another, cargo would build the bindings anew each time.
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 export MPLBACKEND := Agg
@@ -54,6 +55,9 @@ lint: .venv/ready toolchain ## formatting, lints and types of Rust and Python; w
 	@$(BIN)/mypy --strict reference/*.py
 	$(call say,rooms of the Python package)
 	@PYTHONPATH=python $(BIN)/lint-imports --no-logo --no-cache
+	$(call say,format and lints: JavaScript)
+	@$(BIN)/oxlint --deny-warnings $(SCRIPTS)
+	@$(BIN)/oxfmt --check $(SCRIPTS)
 
 .PHONY: test-rust
 test-rust: .venv/ready toolchain ## Rust tests and doctests
@@ -149,6 +153,7 @@ format: .venv/ready toolchain ## formats Rust and Python
 	@cargo fmt --all
 	@$(BIN)/ruff format
 	@$(BIN)/ruff check --fix
+	@$(BIN)/oxfmt --write $(SCRIPTS)
 
 .PHONY: clean
 clean: ## removes whatever was built, the virtual environment too

@@ -10,8 +10,22 @@
  * Every text goes to the canvas or to textContent: a channel's name is never read as markup.
  */
 const Charts = (() => {
-  const COLOURS = ["ink", "muted", "rule", "surface", "shade", "target", "measured", "error", "value", "second", "third",
-    "doubtful", "interval", "limit"];
+  const COLOURS = [
+    "ink",
+    "muted",
+    "rule",
+    "surface",
+    "shade",
+    "target",
+    "measured",
+    "error",
+    "value",
+    "second",
+    "third",
+    "doubtful",
+    "interval",
+    "limit",
+  ];
   const FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif';
   const Y_AXIS = 70;
   const colour = {};
@@ -111,7 +125,12 @@ const Charts = (() => {
     const back = log ? Math.exp : (v) => v;
     const self = {
       key: `group-${Math.random().toString(36).slice(2)}`,
-      log, extent, home, min: home[0], max: home[1], members,
+      log,
+      extent,
+      home,
+      min: home[0],
+      max: home[1],
+      members,
       set(from, to) {
         let min = Math.max(from, self.extent[0]);
         let max = Math.min(to, self.extent[1]);
@@ -143,9 +162,14 @@ const Charts = (() => {
     host.addEventListener("keydown", (event) => {
       if (event.ctrlKey || event.metaKey || event.altKey) return;
       const action = {
-        ArrowLeft: () => linked.move(-0.1), ArrowRight: () => linked.move(0.1),
-        "+": () => linked.move(0, 0.5), "=": () => linked.move(0, 0.5), "-": () => linked.move(0, 2),
-        0: linked.reset, Home: linked.reset, Escape: linked.reset,
+        ArrowLeft: () => linked.move(-0.1),
+        ArrowRight: () => linked.move(0.1),
+        "+": () => linked.move(0, 0.5),
+        "=": () => linked.move(0, 0.5),
+        "-": () => linked.move(0, 2),
+        0: linked.reset,
+        Home: linked.reset,
+        Escape: linked.reset,
       }[event.key];
       if (!action) return;
       event.preventDefault();
@@ -158,10 +182,16 @@ const Charts = (() => {
   function axis(side, { label, log, values }) {
     const horizontal = side === 2;
     return {
-      side, label, scale: horizontal ? "x" : "y",
+      side,
+      label,
+      scale: horizontal ? "x" : "y",
       stroke: () => colour.muted,
-      font: `12px ${FONT}`, labelFont: `12px ${FONT}`,
-      size: horizontal ? 28 : Y_AXIS - 18, labelSize: 18, labelGap: 0, gap: 4,
+      font: `12px ${FONT}`,
+      labelFont: `12px ${FONT}`,
+      size: horizontal ? 28 : Y_AXIS - 18,
+      labelSize: 18,
+      labelGap: 0,
+      gap: 4,
       space: horizontal ? 70 : 32,
       grid: { stroke: () => colour.rule, width: 1 },
       ticks: { show: false },
@@ -330,37 +360,56 @@ const Charts = (() => {
       padding: [8, 10, 0, 0],
       scales: { x: xScale, y: { distr: o.y.log ? 3 : 1, range: valueRange(o) } },
       axes: [axis(2, { label: o.x.label, log }), axis(3, { label: o.y.label, log: o.y.log })],
-      series: [{ label: o.x.name || "at", value: live("x", o.x.unit) }].concat(o.series.map((s) => ({
-        label: s.label,
-        stroke: () => colour[s.colour],
-        fill: s.fill ? () => colour[s.fill] : undefined,
-        width: s.width || 1.25,
-        dash: s.dash,
-        auto: s.auto !== false,
-        value: live(s.label, s.unit ?? o.y.unit),
-        class: s.silent ? "silent" : undefined,
-        points: { show: s.points ?? false, size: 4, filter: s.points ? undefined : lonely },
-        spanGaps: false,
-      }))),
+      series: [{ label: o.x.name || "at", value: live("x", o.x.unit) }].concat(
+        o.series.map((s) => ({
+          label: s.label,
+          stroke: () => colour[s.colour],
+          fill: s.fill ? () => colour[s.fill] : undefined,
+          width: s.width || 1.25,
+          dash: s.dash,
+          auto: s.auto !== false,
+          value: live(s.label, s.unit ?? o.y.unit),
+          class: s.silent ? "silent" : undefined,
+          points: { show: s.points ?? false, size: 4, filter: s.points ? undefined : lonely },
+          spanGaps: false,
+        })),
+      ),
       bands: (o.intervals || []).map((pair) => ({ series: pair, fill: () => colour.interval })),
       legend: { live: true, markers: { width: 2, stroke: (u, i) => swatch(o, i), fill: (u, i) => swatch(o, i) } },
       cursor: {
         y: false,
         drag: { x: true, y: false, dist: 4 },
         points: { size: 7, width: 0, fill: (u, i) => swatch(o, i) },
-        sync: linked ? {
-          key: linked.key, scales: ["x", null], setSeries: false,
-          filters: { pub: (type) => type === "mousemove" || type === "mouseleave" },
-        } : undefined,
-        bind: { dblclick: () => () => { if (linked) linked.reset(); else chart.u.setData(chart.u.data); return null; } },
+        sync: linked
+          ? {
+              key: linked.key,
+              scales: ["x", null],
+              setSeries: false,
+              filters: { pub: (type) => type === "mousemove" || type === "mouseleave" },
+            }
+          : undefined,
+        bind: {
+          dblclick: () => () => {
+            if (linked) linked.reset();
+            else chart.u.setData(chart.u.data);
+            return null;
+          },
+        },
       },
       hooks: {
         drawClear: [(u) => drawShades(u, o.shades)],
         drawAxes: [(u) => drawReferences(u, o.references)],
-        draw: [(u) => { drawMarks(u, o.marks); drawLimits(u, o.references, o.limits); }],
-        setScale: [(u, key) => {
-          if (linked && key === "x" && linked.members.has(u)) linked.set(u.scales.x.min, u.scales.x.max);
-        }],
+        draw: [
+          (u) => {
+            drawMarks(u, o.marks);
+            drawLimits(u, o.references, o.limits);
+          },
+        ],
+        setScale: [
+          (u, key) => {
+            if (linked && key === "x" && linked.members.has(u)) linked.set(u.scales.x.min, u.scales.x.max);
+          },
+        ],
         setLegend: [(u) => host.classList.toggle("hovered", u.cursor.idx != null)],
       },
     };
@@ -453,7 +502,10 @@ const Charts = (() => {
       });
     }
 
-    let home = [[-1, 1], [-1, 1]];
+    let home = [
+      [-1, 1],
+      [-1, 1],
+    ];
     function frame(xs, ys) {
       const [a, b] = [extremes(xs), extremes(ys)];
       const span = 1.08 * Math.max(a[1] - a[0], b[1] - b[0], 1e-12 * Math.max(Math.abs(a[1]), Math.abs(b[1])), 1e-300);
@@ -466,25 +518,45 @@ const Charts = (() => {
 
     frame(...o.data);
     const size = side();
-    const u = new uPlot({
-      mode: 2, width: size, height: size - (Y_AXIS - 44), padding: [8, 10, 0, 0],
-      scales: {
-        x: { time: false, auto: false, min: home[0][0], max: home[0][1] },
-        y: { auto: false, min: home[1][0], max: home[1][1] },
+    const u = new uPlot(
+      {
+        mode: 2,
+        width: size,
+        height: size - (Y_AXIS - 44),
+        padding: [8, 10, 0, 0],
+        scales: {
+          x: { time: false, auto: false, min: home[0][0], max: home[0][1] },
+          y: { auto: false, min: home[1][0], max: home[1][1] },
+        },
+        axes: [axis(2, { label: o.x.label }), axis(3, { label: o.y.label })],
+        series: [
+          {},
+          {
+            facets: [
+              { scale: "x", auto: false },
+              { scale: "y", auto: false },
+            ],
+            paths: trace,
+            stroke: () => colour.value,
+            points: { show: false },
+          },
+        ],
+        legend: { show: false },
+        cursor: {
+          points: { show: false },
+          drag: { x: true, y: true, dist: 4 },
+          bind: {
+            dblclick: () => () => {
+              show(u, home);
+              return null;
+            },
+          },
+        },
+        hooks: { drawAxes: [diagonal] },
       },
-      axes: [axis(2, { label: o.x.label }), axis(3, { label: o.y.label })],
-      series: [{}, {
-        facets: [{ scale: "x", auto: false }, { scale: "y", auto: false }],
-        paths: trace, stroke: () => colour.value, points: { show: false },
-      }],
-      legend: { show: false },
-      cursor: {
-        points: { show: false },
-        drag: { x: true, y: true, dist: 4 },
-        bind: { dblclick: () => () => { show(u, home); return null; } },
-      },
-      hooks: { drawAxes: [diagonal] },
-    }, [null, o.data], host);
+      [null, o.data],
+      host,
+    );
     const chart = register(u, host, () => {
       const now = side();
       if (host.clientWidth > 0 && now !== u.width) u.setSize({ width: now, height: now - (Y_AXIS - 44) });

@@ -25,7 +25,9 @@
   /* Times of samples 0, 1, 2, ... or of those that `index` names. */
   function times({ start, step, n, index }) {
     const kept = column(index);
-    return kept ? Float64Array.from(kept, (i) => start + i * step) : Float64Array.from({ length: n }, (_, i) => start + i * step);
+    return kept
+      ? Float64Array.from(kept, (i) => start + i * step)
+      : Float64Array.from({ length: n }, (_, i) => start + i * step);
   }
 
   function firstAtLeast(sorted, value) {
@@ -70,15 +72,29 @@
       ...(t.strongest ? [[t.strongest_label, () => t.strongest]] : []),
     ]);
     Charts.lines(host("history"), {
-      x: axis, y: { label: t.label, unit: a.unit }, height: 250, data: [x, target, measured],
-      series: [{ label: t.target_label, colour: "target" }, { label: t.measured_label, colour: "measured" }],
+      x: axis,
+      y: { label: t.label, unit: a.unit },
+      height: 250,
+      data: [x, target, measured],
+      series: [
+        { label: t.target_label, colour: "target" },
+        { label: t.measured_label, colour: "measured" },
+      ],
     });
     Charts.lines(host("error"), {
-      x: axis, y: { label: t.error_label, unit: a.unit }, height: 170, data: [x, error],
-      references: [{ value: 0 }], series: [{ label: t.error_name, colour: "error" }],
+      x: axis,
+      y: { label: t.error_label, unit: a.unit },
+      height: 170,
+      data: [x, error],
+      references: [{ value: 0 }],
+      series: [{ label: t.error_name, colour: "error" }],
     });
     const loop = Charts.loop(host("loop"), {
-      x: { label: t.x_label }, y: { label: t.y_label }, data: [target, measured], colour: "value", size: 500,
+      x: { label: t.x_label },
+      y: { label: t.y_label },
+      data: [target, measured],
+      colour: "value",
+      size: 500,
     });
     let waiting = false;
     linked.onChange(() => {
@@ -110,19 +126,39 @@
       const edge = { label: "interval", colour: "interval", width: 0.5, silent: true };
       const n = 1 + second.length;
       Charts.lines(host, {
-        x: axis, y: { label, unit, least }, height: 190, shades, limits,
+        x: axis,
+        y: { label, unit, least },
+        height: 190,
+        shades,
+        limits,
         data: [x, take(key), ...(m.both ? [take(`trusted_${key}`)] : []), ...band],
         references: [{ value: name === "delay" ? 0 : 1 }, ...reference(whole, "whole record", factor)],
         series: [first, ...second, ...band.map(() => edge)],
         intervals: band.length ? [[n + 1, n + 2]] : [],
       });
     };
-    const overall = m.both && a.trusted_delay_s !== null
-      ? [a.trusted_amplitude, a.trusted_delay_s] : [a.amplitude, a.delay_s];
-    chart(host("moving-amplitude"), "amplitude", "Amplitude A (-)", "", 0.02, 1, overall[0],
-      limitPair(a.limits.amplitude, 1, Charts.short));
-    chart(host("moving-delay"), "delay", "Delay d (ms)", "ms", 0.5, 1e3, overall[1],
-      limitPair(a.limits.delay_s == null ? null : a.limits.delay_s * 1e3, 0, (v) => `${Charts.short(v)} ms`));
+    const overall =
+      m.both && a.trusted_delay_s !== null ? [a.trusted_amplitude, a.trusted_delay_s] : [a.amplitude, a.delay_s];
+    chart(
+      host("moving-amplitude"),
+      "amplitude",
+      "Amplitude A (-)",
+      "",
+      0.02,
+      1,
+      overall[0],
+      limitPair(a.limits.amplitude, 1, Charts.short),
+    );
+    chart(
+      host("moving-delay"),
+      "delay",
+      "Delay d (ms)",
+      "ms",
+      0.5,
+      1e3,
+      overall[1],
+      limitPair(a.limits.delay_s == null ? null : a.limits.delay_s * 1e3, 0, (v) => `${Charts.short(v)} ms`),
+    );
   }
 
   function drawHistories(a, host, axis) {
@@ -130,19 +166,31 @@
     const x = times(h);
     const squared = a.unit ? `${a.unit}²` : "";
     Charts.lines(host("running-errors"), {
-      x: axis, y: { label: h.error_label, unit: a.unit, zero: true }, height: 170,
+      x: axis,
+      y: { label: h.error_label, unit: a.unit, zero: true },
+      height: 170,
       data: [x, gaps(column(h.max_tracking_error)), gaps(column(h.rms_error))],
-      series: [{ label: "MTE so far", colour: "error" }, { label: "RMS so far", colour: "third", width: 1.5 }],
+      series: [
+        { label: "MTE so far", colour: "error" },
+        { label: "RMS so far", colour: "third", width: 1.5 },
+      ],
     });
     Charts.lines(host("indicator"), {
-      x: axis, y: { label: h.indicator_label, unit: squared }, height: 170,
+      x: axis,
+      y: { label: h.indicator_label, unit: squared },
+      height: 170,
       data: [x, gaps(column(h.tracking_indicator))],
-      references: [{ value: 0 }], series: [{ label: "TI", colour: "second", width: 1.5 }],
+      references: [{ value: 0 }],
+      series: [{ label: "TI", colour: "second", width: 1.5 }],
     });
     if (h.energy_error) {
       Charts.lines(host("energy"), {
-        x: axis, y: { label: "Energy error" }, height: 170, data: [x, gaps(column(h.energy_error))],
-        references: [{ value: 0 }], series: [{ label: "energy error", colour: "second", width: 1.5 }],
+        x: axis,
+        y: { label: "Energy error" },
+        height: 170,
+        data: [x, gaps(column(h.energy_error))],
+        references: [{ value: 0 }],
+        series: [{ label: "energy error", colour: "second", width: 1.5 }],
       });
     }
   }
@@ -152,24 +200,39 @@
     if (!f) return;
     const linked = Charts.group({ extent: f.extent, home: f.home, log: true });
     const axis = { label: "Frequency (Hz)", name: "f", unit: "Hz", group: linked };
-    const marks = Number.isFinite(a.equivalent_frequency_hz) && a.equivalent_frequency_hz !== null
-      ? [{ at: a.equivalent_frequency_hz, label: `f_eq ${Charts.number(a.equivalent_frequency_hz, 3)} Hz` }] : [];
+    const marks =
+      Number.isFinite(a.equivalent_frequency_hz) && a.equivalent_frequency_hz !== null
+        ? [{ at: a.equivalent_frequency_hz, label: `f_eq ${Charts.number(a.equivalent_frequency_hz, 3)} Hz` }]
+        : [];
     const bare = marks.map(({ at }) => ({ at }));
     const shades = f.outside.map(([from, to]) => ({ from, to }));
     buttons(panel, "frequency", linked, [
-      ["Where the target moves", () => f.home], ["All frequencies", () => f.extent],
+      ["Where the target moves", () => f.home],
+      ["All frequencies", () => f.extent],
     ]);
     const s = a.spectrum;
     if (s) {
       const x = column(s.frequency);
       Charts.lines(host("spectra"), {
-        x: axis, y: { label: s.label, unit: s.unit, log: true, decades: 6 }, height: 290, marks, shades,
+        x: axis,
+        y: { label: s.label, unit: s.unit, log: true, decades: 6 },
+        height: 290,
+        marks,
+        shades,
         data: [x, positive(column(s.target)), positive(column(s.measured))],
-        series: [{ label: a.time.target_label, colour: "target" }, { label: a.time.measured_label, colour: "measured" }],
+        series: [
+          { label: a.time.target_label, colour: "target" },
+          { label: a.time.measured_label, colour: "measured" },
+        ],
       });
       Charts.lines(host("weights"), {
-        x: axis, y: { label: "Weight of a bin (-)", zero: true }, height: 220, marks: bare, shades,
-        data: [x, gaps(column(s.weights))], series: [{ label: "weight w", colour: "second", width: 1.5 }],
+        x: axis,
+        y: { label: "Weight of a bin (-)", zero: true },
+        height: 220,
+        marks: bare,
+        shades,
+        data: [x, gaps(column(s.weights))],
+        series: [{ label: "weight w", colour: "second", width: 1.5 }],
       });
     }
     const r = a.response;
@@ -189,24 +252,50 @@
       const straight = line(keys[0], factor);
       const edge = { label: "interval", colour: "interval", width: 0.5, auto: false, silent: true };
       Charts.lines(host(name), {
-        x: axis, y: { label, unit, least }, height: 180, marks: bare, shades, references, limits,
+        x: axis,
+        y: { label, unit, least },
+        height: 180,
+        marks: bare,
+        shades,
+        references,
+        limits,
         data: [x, gaps(values), where(values, sure), gaps(high), gaps(low), ...straight],
         series: [
           { label: name, colour: "doubtful", swatch: "value", auto: !any },
           { label: name, colour: "value", width: 1.75, silent: true },
-          edge, edge,
+          edge,
+          edge,
           ...straight.map(() => ({ label: "line", colour: "second", dash: [6, 4], width: 1.5 })),
         ],
         intervals: [[3, 4]],
       });
     };
-    curve("gain", "Gain (-)", "", 0.02, 1, ["gain", "gain_low", "gain_high"],
-      [{ value: 1 }, ...reference(a.amplitude, "A")], limitPair(a.limits.amplitude, 1, Charts.short));
-    curve("delay", "Delay (ms)", "ms", 0.5, 1e3, ["delay_s", "delay_low_s", "delay_high_s"],
+    curve(
+      "gain",
+      "Gain (-)",
+      "",
+      0.02,
+      1,
+      ["gain", "gain_low", "gain_high"],
+      [{ value: 1 }, ...reference(a.amplitude, "A")],
+      limitPair(a.limits.amplitude, 1, Charts.short),
+    );
+    curve(
+      "delay",
+      "Delay (ms)",
+      "ms",
+      0.5,
+      1e3,
+      ["delay_s", "delay_low_s", "delay_high_s"],
       [{ value: 0 }, ...reference(a.delay_s, "d", 1e3)],
-      limitPair(a.limits.delay_s == null ? null : a.limits.delay_s * 1e3, 0, (v) => `${Charts.short(v)} ms`));
+      limitPair(a.limits.delay_s == null ? null : a.limits.delay_s * 1e3, 0, (v) => `${Charts.short(v)} ms`),
+    );
     Charts.lines(host("coherence"), {
-      x: axis, y: { label: "Coherence (-)", fixed: [0, 1.05] }, height: 150, marks: bare, shades,
+      x: axis,
+      y: { label: "Coherence (-)", fixed: [0, 1.05] },
+      height: 150,
+      marks: bare,
+      shades,
       references: [{ value: r.low_coherence, label: Charts.short(r.low_coherence) }],
       data: [x, gaps(coherence), where(coherence, sure)],
       series: [
@@ -236,7 +325,9 @@
   const panels = [...document.querySelectorAll(".assessment")];
 
   function select(number, focus) {
-    panels.forEach((panel, i) => { panel.hidden = i !== number; });
+    panels.forEach((panel, i) => {
+      panel.hidden = i !== number;
+    });
     tabs.forEach((tab, i) => {
       tab.setAttribute("aria-selected", String(i === number));
       tab.tabIndex = i === number ? 0 : -1;
@@ -254,7 +345,14 @@
   tabs.forEach((tab, i) => {
     tab.addEventListener("click", () => select(i, true));
     tab.addEventListener("keydown", (event) => {
-      const to = { ArrowRight: i + 1, ArrowDown: i + 1, ArrowLeft: i - 1, ArrowUp: i - 1, Home: 0, End: tabs.length - 1 }[event.key];
+      const to = {
+        ArrowRight: i + 1,
+        ArrowDown: i + 1,
+        ArrowLeft: i - 1,
+        ArrowUp: i - 1,
+        Home: 0,
+        End: tabs.length - 1,
+      }[event.key];
       if (to === undefined) return;
       event.preventDefault();
       select((to + tabs.length) % tabs.length, true);

@@ -40,7 +40,13 @@ RETRY_MS = 500
 
 _PIECE = 1 << 16
 _STYLES = ("uPlot.min.css", "charts.css", "live.css")
-_SCRIPTS = ("uPlot.iife.min.js", "charts.js", "live.js")
+# The panels stand between what they use and the run that makes them.
+_PANELS = ("cards", "moving", "signals", "spectrum", "health", "alarms")
+_SCRIPTS = (
+    "uPlot.iife.min.js",
+    "charts.js",
+    *(f"live/{name}.js" for name in ("page", "kept", *_PANELS, "run", "connection")),
+)
 _HOST = re.compile(r"(\[[0-9a-f:.]+\]|[^\[\]:/@\s]+)(?::\d{1,5})?", re.ASCII)
 _LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
