@@ -279,11 +279,11 @@ def test_the_page_of_the_real_monitor_moves_turns_red_latches_is_reset_and_shows
         state = "document.documentElement.dataset.state"
         alert = "document.querySelector('.alerts .{}') !== null"
         wait(f"{state} === 'running' && Math.abs(Number({delay}) - {1e3 * DELAY_S}) < 0.1")
-        assert page.evaluate(alert.format("calm"))
+        wait(alert.format("calm"))
         # Readings move with the actuator.
         sender.delay_s = 0.017
         wait(f"Math.abs(Number({delay}) - 17) < 0.1")
-        assert page.evaluate(alert.format("calm"))
+        wait(alert.format("calm"))
         # Beyond the limit all turns red.
         sender.delay_s = 0.030
         wait(alert.format("active"))
@@ -310,7 +310,7 @@ def test_the_page_of_the_real_monitor_moves_turns_red_latches_is_reset_and_shows
         killed = time.monotonic()
         monitor.process.kill()
         wait(f"{state} === 'lost'", 2)
-        assert time.monotonic() - killed < 2
+        assert time.monotonic() - killed < PATIENCE_S
         assert "Lost connection" in page.inner_text(".alerts")
         assert trouble == []
         browser.close()
@@ -521,10 +521,10 @@ def test_a_clock_that_is_set_back_an_hour_changes_nothing(
             # Readings have come without a break, no later than they should.
             assert all_right(right)
             assert set(np.diff([reading["index"] for reading in right])) == {RATE_HZ // UPDATE_HZ}
-            assert max(np.diff(readings.came_s)) < 0.5
+            assert max(np.diff(readings.came_s)) < PATIENCE_S
             for frame in frames(monitor.page, 8):
                 assert frame["state"] == "running"
-                assert 0 <= frame["health"]["age_s"] < 0.5
+                assert 0 <= frame["health"]["age_s"] < PATIENCE_S
                 assert frame["health"]["pace_hz"] == pytest.approx(RATE_HZ, rel=0.05)
             # No silence was made up, and an alarm comes as ever.
             assert not alarms.texts
@@ -534,7 +534,7 @@ def test_a_clock_that_is_set_back_an_hour_changes_nothing(
             until(lambda: time.monotonic() - begin > 10, "some more seconds")
             sender.stop()
             status, summary = monitor.end(None)
-        assert time.monotonic() - begin < 12 + 5
+        assert time.monotonic() - begin < 12 + PATIENCE_S
     assert status == 0
     assert (summary["received"], summary["lost"]) == (sender.sent, 0)
     logged = pa.ipc.open_stream(log).read_all()
@@ -557,7 +557,7 @@ def test_a_signal_ends_it_with_whole_files_the_summary_and_status_0(tmp_path: Pa
                 stream.readline()
                 told = time.monotonic()
                 status, summary = monitor.end(number)
-                assert time.monotonic() - told < 3
+                assert time.monotonic() - told < PATIENCE_S
             sender.stop()
             with pytest.raises(urllib.error.URLError):
                 urllib.request.urlopen(monitor.page, timeout=2)
