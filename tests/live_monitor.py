@@ -20,7 +20,7 @@ import numpy as np
 
 RATE_HZ, GAIN, DELAY_S = 512, 1.05, 0.012
 COMMAND = (sys.executable, "-m", "rthstrack")
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 
 
 def motion(t: Any) -> Any:
