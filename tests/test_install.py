@@ -78,7 +78,7 @@ def test_the_wheel_holds_the_package_its_types_and_its_assets(wheel: zipfile.Zip
     expected = {
         path.relative_to(package.parent).as_posix()
         for path in package.rglob("*")
-        if path.suffix in kept or path.name == "py.typed" or path.parent.name == "assets"
+        if path.is_file() and (path.suffix in kept or path.name == "py.typed" or path.parent.name == "assets")
     }
     assert {"rthstrack/py.typed", "rthstrack/_core.pyi", "rthstrack/__init__.py"} <= expected
     assert any(name.startswith("rthstrack/assets/") for name in expected)
