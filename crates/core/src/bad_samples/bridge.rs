@@ -41,3 +41,11 @@ pub(super) fn bridge(signal: &mut [f64], marks: &[u8], range: Range<usize>) {
         a = b;
     }
 }
+
+/// Takes sample i, which comes after all that are there, into the stretches that are bridged.
+pub(super) fn widen(gaps: &mut Vec<Range<usize>>, i: usize) {
+    match gaps.last_mut() {
+        Some(gap) if gap.end == i => gap.end = i + 1,
+        _ => gaps.push(i..i + 1),
+    }
+}

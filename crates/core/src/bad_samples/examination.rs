@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::about::About;
-use super::bridge::{GOOD, bridge};
+use super::bridge::{GOOD, bridge, widen};
 use super::found::{BAD_KINDS, BadFound, BadKind, BadSamples};
 use super::held::{held, noise_of_fresh};
 use super::look::{Look, Sight};
@@ -132,10 +132,7 @@ impl Examination {
         gaps.clear();
         for (i, mark) in marks.iter().enumerate().filter(|(_, mark)| **mark != GOOD) {
             self.found.add(channel, BAD_KINDS[usize::from(*mark) - 1], i);
-            match gaps.last_mut() {
-                Some(gap) if gap.end == i => gap.end = i + 1,
-                _ => gaps.push(i..i + 1),
-            }
+            widen(gaps, i);
         }
         bridge(own, marks, 0..signal.len());
     }

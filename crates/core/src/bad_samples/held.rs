@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::bridge::widen;
 use super::differences::{MEDIAN, OF_G, fourth, middle};
 use super::found::BadCount;
 use crate::lagrange::{BEFORE, NODES, Taps};
@@ -28,11 +29,12 @@ impl Held {
     /// Reads a channel between its fresh values into `own`; what is not good enough goes to `gaps`. How much is held.
     pub(super) fn read_between(self, signal: &[f64], own: &mut [f64], gaps: &mut Vec<Range<usize>>) -> BadCount {
         let Self { every, phase } = self;
+        let is_stale = |i: usize| !(i + every - phase % every).is_multiple_of(every);
         gaps.clear();
         let n = signal.len();
         let fresh = (n - phase).div_ceil(every);
         let mut held = BadCount { every: every as u32, ..BadCount::default() };
-        for i in (0..n).filter(|i| (i + every - phase % every) % every != 0) {
+        for i in (0..n).filter(|i| is_stale(*i)) {
             if held.count == 0 {
                 held.first = u32::try_from(i).unwrap_or(u32::MAX);
             }
@@ -57,12 +59,7 @@ impl Held {
         }
         // Near the ends a straight line is not good enough.
         for (first, last) in [(0, phase + from * every), ((phase + to * every + 1).min(n), n)] {
-            for i in (first..last).filter(|i| (i + every - phase % every) % every != 0) {
-                match gaps.last_mut() {
-                    Some(gap) if gap.end == i => gap.end = i + 1,
-                    _ => gaps.push(i..i + 1),
-                }
-            }
+            (first..last).filter(|i| is_stale(*i)).for_each(|i| widen(gaps, i));
         }
         held
     }
