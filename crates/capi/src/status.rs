@@ -135,90 +135,10 @@ impl Code {
 
     /// The code, and what the reason says in numbers; NaN where it says none.
     pub(crate) fn of(reason: Option<Reason>) -> (Code, [f64; 2]) {
-        let plain = |code| (code, [f64::NAN; 2]);
-        let with = |code, value| (code, [value, f64::NAN]);
-        match reason {
-            None => plain(Code::RTHSTRACK_REASON_NONE),
-            Some(Reason::Still) => plain(Code::RTHSTRACK_REASON_STILL),
-            Some(Reason::NotFinite) => plain(Code::RTHSTRACK_REASON_NOT_FINITE),
-            Some(Reason::Range) => plain(Code::RTHSTRACK_REASON_RANGE),
-            Some(Reason::TooShort { n_samples }) => with(Code::RTHSTRACK_REASON_TOO_SHORT, n_samples as f64),
-            Some(Reason::FewCycles { found }) => with(Code::RTHSTRACK_REASON_FEW_CYCLES, found),
-            Some(Reason::LowCoherence { goodness }) => with(Code::RTHSTRACK_REASON_LOW_COHERENCE, goodness),
-            Some(Reason::Uncertain { reach_s }) => with(Code::RTHSTRACK_REASON_UNCERTAIN, reach_s),
-            Some(Reason::Ambiguous { delay_s, other_s }) => (Code::RTHSTRACK_REASON_AMBIGUOUS, [delay_s, other_s]),
-            Some(Reason::BeyondMaxDelay { max_delay_s }) => with(Code::RTHSTRACK_REASON_BEYOND_MAX_DELAY, max_delay_s),
-            Some(Reason::OppositeSign { delay_s }) => with(Code::RTHSTRACK_REASON_OPPOSITE_SIGN, delay_s),
-            Some(Reason::NoConvergence) => plain(Code::RTHSTRACK_REASON_NO_CONVERGENCE),
-            Some(Reason::BadSamples { share }) => with(Code::RTHSTRACK_REASON_BAD_SAMPLES, share),
-            Some(Reason::NoisyTarget { share }) => with(Code::RTHSTRACK_REASON_NOISY_TARGET, share),
-            Some(Reason::ResidualFollowsTarget { coherence }) => {
-                with(Code::RTHSTRACK_REASON_RESIDUAL_FOLLOWS_TARGET, coherence)
-            }
-            Some(Reason::FewBins) => plain(Code::RTHSTRACK_REASON_FEW_BINS),
-            Some(Reason::WeightPower) => plain(Code::RTHSTRACK_REASON_WEIGHT_POWER),
-            Some(Reason::TooFast { share }) => with(Code::RTHSTRACK_REASON_TOO_FAST, share),
-            Some(Reason::ColouredTargetNoise { share }) => with(Code::RTHSTRACK_REASON_COLOURED_TARGET_NOISE, share),
-            Some(_) => plain(Code::RTHSTRACK_REASON_OTHER),
-        }
-    }
-
-    fn text(self) -> &'static CStr {
-        match self {
-            Code::RTHSTRACK_REASON_NONE => c"nothing is missing",
-            Code::RTHSTRACK_REASON_STILL => c"not determined: too little motion to judge by",
-            Code::RTHSTRACK_REASON_NOT_FINITE => c"not determined: the window holds samples that are NaN or infinite",
-            Code::RTHSTRACK_REASON_RANGE => {
-                c"not determined: magnitudes leave the range of double precision; scale the signals to a usual unit"
-            }
-            Code::RTHSTRACK_REASON_TOO_SHORT => {
-                c"not determined: too few samples are left for which the shifted target is known; lower max_delay_s or \
-                  take a longer window"
-            }
-            Code::RTHSTRACK_REASON_FEW_CYCLES => {
-                c"not determined: target goes through too little of a cycle, at least 0.6 is needed; take a longer \
-                  window"
-            }
-            Code::RTHSTRACK_REASON_LOW_COHERENCE => {
-                c"not determined: too little of measured follows target; is this the right pair?"
-            }
-            Code::RTHSTRACK_REASON_UNCERTAIN => {
-                c"not determined: noise leaves the delay uncertain by more than half a turn; take a longer window or a \
-                  band with less noise"
-            }
-            Code::RTHSTRACK_REASON_AMBIGUOUS => {
-                c"not determined: ambiguous, two delays fit equally well; give the one expected \
-                  (expected_delay_s)"
-            }
-            Code::RTHSTRACK_REASON_BEYOND_MAX_DELAY => {
-                c"not determined: the delay seems to lie beyond max_delay_s, or beyond a quarter of the window; raise it or \
-                  take a longer window"
-            }
-            Code::RTHSTRACK_REASON_OPPOSITE_SIGN => {
-                c"not determined: measured moves against target; does one of them have the opposite sign?"
-            }
-            Code::RTHSTRACK_REASON_NO_CONVERGENCE => c"not determined: the iteration did not settle on a delay",
-            Code::RTHSTRACK_REASON_NOISY_TARGET => {
-                c"not determined: target is mostly noise of its own; take a longer window or a band with less noise"
-            }
-            Code::RTHSTRACK_REASON_BAD_SAMPLES => {
-                c"not determined: too many samples are bad (spikes, dropouts, frozen or clipped); look at the sensors"
-            }
-            Code::RTHSTRACK_REASON_OTHER => c"not determined",
-            Code::RTHSTRACK_REASON_RESIDUAL_FOLLOWS_TARGET => {
-                c"no interval: what one gain and one delay leave still follows target, so they are not constant over \
-                  frequency or time"
-            }
-            Code::RTHSTRACK_REASON_FEW_BINS => c"no interval: too few frequency bins to know the noise by",
-            Code::RTHSTRACK_REASON_WEIGHT_POWER => c"no interval: it is known for weight power 2 only",
-            Code::RTHSTRACK_REASON_TOO_FAST => {
-                c"no interval: target moves too fast to be read between samples; sample faster"
-            }
-            Code::RTHSTRACK_REASON_COLOURED_TARGET_NOISE => {
-                c"no interval: the noise is coloured, so how much of it is target's own is not known; take a band with less \
-                  noise"
-            }
-        }
+        let Some(reason) = reason else { return (Code::RTHSTRACK_REASON_NONE, [f64::NAN; 2]) };
+        let number = reason.kind().number;
+        let code = Code::ALL.into_iter().find(|code| *code as i32 == number);
+        (code.unwrap_or(Code::RTHSTRACK_REASON_OTHER), reason.values())
     }
 }
 
@@ -236,8 +156,12 @@ pub extern "C" fn rthstrack_status_text(status: i32) -> *const c_char {
 /// Any thread; real-time safe.
 #[unsafe(no_mangle)]
 pub extern "C" fn rthstrack_reason_text(reason: i32) -> *const c_char {
-    let known = Code::ALL.into_iter().find(|r| *r as i32 == reason);
-    known.map_or(c"unknown reason", Code::text).as_ptr()
+    let words = match reason {
+        _ if reason == Code::RTHSTRACK_REASON_NONE as i32 => c"nothing is missing",
+        _ if reason == Code::RTHSTRACK_REASON_OTHER as i32 => c"not determined",
+        _ => Reason::KINDS.iter().find(|kind| kind.number == reason).map_or(c"unknown reason", |kind| kind.words),
+    };
+    words.as_ptr()
 }
 
 #[cfg(test)]
@@ -245,38 +169,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn texts_of_reasons_begin_as_those_of_the_core_do() {
-        let reasons = [
-            Reason::Still,
-            Reason::NotFinite,
-            Reason::Range,
-            Reason::TooShort { n_samples: 3 },
-            Reason::FewCycles { found: 0.5 },
-            Reason::LowCoherence { goodness: 0.25 },
-            Reason::Uncertain { reach_s: 0.125 },
-            Reason::Ambiguous { delay_s: 0.5, other_s: 0.75 },
-            Reason::BeyondMaxDelay { max_delay_s: 0.25 },
-            Reason::OppositeSign { delay_s: 0.25 },
-            Reason::BadSamples { share: 0.5 },
-            Reason::NoConvergence,
-            Reason::NoisyTarget { share: 0.5 },
-            Reason::ResidualFollowsTarget { coherence: 0.5 },
-            Reason::FewBins,
-            Reason::WeightPower,
-            Reason::TooFast { share: 0.5 },
-            Reason::ColouredTargetNoise { share: 0.5 },
-        ];
-        for reason in reasons {
-            let (code, _) = Code::of(Some(reason));
-            let (text, core) = (code.text().to_str().unwrap(), reason.to_string());
-            let length = text.find(|c| ";,?".contains(c)).unwrap_or(text.len());
-            let undetermined = text.starts_with("not determined: ");
-            assert_eq!(undetermined, reason.is_undetermined(), "{reason:?}");
-            assert_eq!(undetermined, core.starts_with("not determined: "), "{reason:?}");
-            // Numbers stand in the middle of some texts.
-            let end = text[..length].rsplit(' ').next().unwrap();
-            assert!(core.contains(end), "{reason:?}: {text}; {core}");
-            assert_ne!(code, Code::RTHSTRACK_REASON_OTHER);
+    fn every_reason_of_the_core_has_its_code_here() {
+        let own = [Code::RTHSTRACK_REASON_NONE as i32, Code::RTHSTRACK_REASON_OTHER as i32];
+        let mut here: Vec<i32> = Code::ALL.iter().map(|code| *code as i32).filter(|n| !own.contains(n)).collect();
+        let mut core: Vec<i32> = Reason::KINDS.iter().map(|kind| kind.number).collect();
+        here.sort_unstable();
+        core.sort_unstable();
+        assert_eq!(here, core);
+    }
+
+    #[test]
+    fn texts_say_whether_there_is_a_number() {
+        for kind in Reason::KINDS {
+            let text = unsafe { CStr::from_ptr(rthstrack_reason_text(kind.number)) }.to_str().unwrap();
+            assert_eq!(text.starts_with("not determined: "), kind.number < 100, "{text}");
+            assert_eq!(text.starts_with("no interval: "), kind.number >= 100, "{text}");
         }
     }
 

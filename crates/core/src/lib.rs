@@ -69,7 +69,7 @@ pub use key_frequencies::{KeyFrequencies, KeyFrequenciesConfig, KeyFrequenciesSt
 pub use monitor::{Monitor, MonitorConfig, MonitorState, Processed, Reading};
 pub use moving::{MovingConfig, MovingTracking, evaluate_moving};
 pub use pair::Pair;
-pub use reason::Reason;
+pub use reason::{Reason, ReasonKind};
 pub use response::{FrequencyResponse, ResponseConfig, Unaligned, frequency_response};
 pub use settings::{Estimator, EvaluatorConfig, Noise};
 pub use slopes::{FrequencySlopes, Slope, SlopesConfig, frequency_slopes};

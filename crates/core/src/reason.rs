@@ -1,110 +1,170 @@
 //! Why a number or its interval is not there: data, not an error.
 
+use std::ffi::CStr;
 use std::fmt;
 
-/// Why gain and delay could not be determined, or no interval is given with them.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub enum Reason {
+/// What is known of every reason of a kind, whatever its values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ReasonKind {
+    /// Its name in programs and files, which never changes.
+    pub code: &'static str,
+    /// Its number in the C interface, which never changes; from 100 on only the interval is missing.
+    pub number: i32,
+    /// What it says without its values.
+    pub words: &'static CStr,
+}
+
+/// The reasons, a row each: number, code, words without values. A reason's values are its fields, in their order.
+macro_rules! reasons {
+    ($($(#[$doc:meta])* $variant:ident $({ $($(#[$field_doc:meta])* $field:ident: $type:ty),+ })?
+        = $number:literal, $code:literal, $words:literal;)+) => {
+        /// Why gain and delay could not be determined, or no interval is given with them.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        #[non_exhaustive]
+        pub enum Reason {
+            $($(#[$doc])* $variant $({ $($(#[$field_doc])* $field: $type),+ })?),+
+        }
+
+        impl Reason {
+            /// All kinds.
+            pub const KINDS: &'static [ReasonKind] =
+                &[$(ReasonKind { code: $code, number: $number, words: $words }),+];
+
+            /// Its kind.
+            pub fn kind(&self) -> ReasonKind {
+                match self {
+                    $(Reason::$variant { .. } => ReasonKind { code: $code, number: $number, words: $words }),+
+                }
+            }
+
+            /// What it says in numbers, in SI units; NaN where it says none.
+            #[allow(clippy::unnecessary_cast, reason = "one row counts samples")]
+            pub fn values(&self) -> [f64; 2] {
+                match *self {
+                    $(Reason::$variant $({ $($field),+ })? => {
+                        let mut values = [f64::NAN; 2];
+                        let found: &[f64] = &[$($($field as f64),+)?];
+                        values[..found.len()].copy_from_slice(found);
+                        values
+                    })+
+                }
+            }
+        }
+    };
+}
+
+reasons! {
     /// The target moves too little in the window, or one signal not at all.
-    Still,
+    Still = 1, "still",
+        c"not determined: too little motion to judge by";
     /// The window holds samples that are NaN or infinite.
-    NotFinite,
+    NotFinite = 2, "not_finite",
+        c"not determined: the window holds samples that are NaN or infinite";
     /// The window holds samples so large or so small that their powers leave the range of double precision.
-    Range,
+    Range = 3, "range",
+        c"not determined: magnitudes leave the range of double precision; scale the signals to a usual unit";
     /// Too few samples are left for which the shifted target is known.
     TooShort {
         /// How many are left.
-        n_samples: usize,
-    },
+        n_samples: usize
+    } = 4, "too_short",
+        c"not determined: too few samples are left for which the shifted target is known; lower max_delay_s or \
+             take a longer window";
     /// The target goes through too little of a cycle.
     FewCycles {
         /// Cycles in the window, by its rms acceleration over its rms velocity.
-        found: f64,
-    },
+        found: f64
+    } = 5, "few_cycles",
+        c"not determined: target goes through too little of a cycle, at least 0.6 is needed; take a longer \
+             window";
     /// Too little of measured follows the target.
     LowCoherence {
         /// Share that follows.
-        goodness: f64,
-    },
+        goodness: f64
+    } = 6, "low_coherence",
+        c"not determined: too little of measured follows target; is this the right pair?";
     /// The delay's interval is wider than half a turn of the motion.
     Uncertain {
         /// From the delay to either end of its interval, in seconds.
-        reach_s: f64,
-    },
+        reach_s: f64
+    } = 7, "uncertain",
+        c"not determined: noise leaves the delay uncertain by more than half a turn; take a longer window or a \
+             band with less noise";
     /// Too many samples are bad: spikes, dropouts, frozen or clipped stretches.
     BadSamples {
         /// Share of the samples that would be left out.
-        share: f64,
-    },
+        share: f64
+    } = 13, "bad_samples",
+        c"not determined: too many samples are bad (spikes, dropouts, frozen or clipped); look at the sensors";
     /// Two delays fit equally well.
     Ambiguous {
         /// One of them, in seconds.
         delay_s: f64,
         /// The other.
-        other_s: f64,
-    },
+        other_s: f64
+    } = 8, "ambiguous",
+        c"not determined: ambiguous, two delays fit equally well; give the one expected \
+             (expected_delay_s)";
     /// The best delay lies outside what was searched.
     BeyondMaxDelay {
         /// The largest delay taken, in seconds.
-        max_delay_s: f64,
-    },
+        max_delay_s: f64
+    } = 9, "beyond_max_delay",
+        c"not determined: the delay seems to lie beyond max_delay_s, or beyond a quarter of the window; raise it or \
+             take a longer window";
     /// Measured moves against the target.
     OppositeSign {
         /// The delay that it would have with the opposite sign, in seconds, to a step of the search.
-        delay_s: f64,
-    },
+        delay_s: f64
+    } = 10, "opposite_sign",
+        c"not determined: measured moves against target; does one of them have the opposite sign?";
     /// The iteration did not settle.
-    NoConvergence,
+    NoConvergence = 11, "no_convergence",
+        c"not determined: the iteration did not settle on a delay";
     /// What the target holds is mostly noise of its own.
     NoisyTarget {
         /// Share of noise in the energy of its displacement or velocity, whichever is larger.
-        share: f64,
-    },
+        share: f64
+    } = 12, "noisy_target",
+        c"not determined: target is mostly noise of its own; take a longer window or a band with less noise";
     /// No interval: the residual follows the target, so that gain and delay are not one number each.
     ResidualFollowsTarget {
         /// Coherence of residual and target.
-        coherence: f64,
-    },
+        coherence: f64
+    } = 100, "residual_follows_target",
+        c"no interval: what one gain and one delay leave still follows target, so they are not constant over \
+             frequency or time";
     /// No interval: the target moves too fast to be read between samples.
     TooFast {
         /// Share of the target's energy that lies above about 0.35 of the rate.
-        share: f64,
-    },
+        share: f64
+    } = 103, "too_fast",
+        c"no interval: target moves too fast to be read between samples; sample faster";
     /// No interval: the noise is coloured, and how much of it is the target's own is not known.
     ColouredTargetNoise {
         /// Share of the energy of the target, or of its velocity, that may be noise.
-        share: f64,
-    },
+        share: f64
+    } = 104, "coloured_target_noise",
+        c"no interval: the noise is coloured, so how much of it is target's own is not known; take a band with less \
+             noise";
     /// No interval: too few frequency bins to know the noise by.
-    FewBins,
+    FewBins = 101, "few_bins",
+        c"no interval: too few frequency bins to know the noise by";
     /// No interval: it is known for weight power 2 only.
-    WeightPower,
+    WeightPower = 102, "weight_power",
+        c"no interval: it is known for weight power 2 only";
 }
 
 impl Reason {
     /// Whether there is no number either.
     pub fn is_undetermined(&self) -> bool {
-        !matches!(
-            self,
-            Reason::ResidualFollowsTarget { .. }
-                | Reason::TooFast { .. }
-                | Reason::ColouredTargetNoise { .. }
-                | Reason::FewBins
-                | Reason::WeightPower
-        )
+        self.kind().number < 100
     }
 }
 
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Reason::Still => write!(f, "not determined: too little motion to judge by"),
-            Reason::NotFinite => write!(f, "not determined: the window holds samples that are NaN or infinite"),
-            Reason::Range => write!(
-                f,
-                "not determined: magnitudes leave the range of double precision; scale the signals to a usual unit"
-            ),
             Reason::TooShort { n_samples } => write!(
                 f,
                 "not determined: only {n_samples} samples are left for which the shifted target is known; \
@@ -142,7 +202,7 @@ impl fmt::Display for Reason {
             Reason::Ambiguous { delay_s, other_s } => write!(
                 f,
                 "not determined: ambiguous, delays of {:.4} and {:.4} ms fit equally well; give the one expected \
-                 (expected_delay_s, --expected-delay)",
+                 (expected_delay_s)",
                 1e3 * delay_s,
                 1e3 * other_s
             ),
@@ -160,7 +220,6 @@ impl fmt::Display for Reason {
                 if *delay_s < 0.0 { "with a lead" } else { "with a lag" },
                 1e3 * delay_s.abs()
             ),
-            Reason::NoConvergence => write!(f, "not determined: the iteration did not settle on a delay"),
             Reason::NoisyTarget { share } => write!(
                 f,
                 "not determined: target is mostly noise of its own ({:.0} % of it or of its velocity); take a longer window or \
@@ -184,8 +243,12 @@ impl fmt::Display for Reason {
                  velocity); take a band with less noise",
                 100.0 * share
             ),
-            Reason::FewBins => write!(f, "no interval: too few frequency bins to know the noise by"),
-            Reason::WeightPower => write!(f, "no interval: it is known for weight power 2 only"),
+            Reason::Still
+            | Reason::NotFinite
+            | Reason::Range
+            | Reason::NoConvergence
+            | Reason::FewBins
+            | Reason::WeightPower => f.write_str(self.kind().words.to_str().unwrap_or_default()),
         }
     }
 }
