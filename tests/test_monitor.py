@@ -123,14 +123,14 @@ def test_an_index_that_cannot_be_is_refused(index):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"rate_hz": 0}, "rate_hz must be a positive finite number, not 0"),
+        ({"rate_hz": 0}, "rate_hz must be a positive frequency in hertz, not 0"),
         ({"window_s": 1e12}, "window_s must be from"),
         ({"update_hz": 1e6}, "update_hz must be above 0 and at most 512 Hz"),
         ({"estimator": "best"}, "estimator must be one of fei, aligned, least_squares, not 'best'"),
         ({"data_decimation": 3}, "data_decimation must be a power of two"),
         ({"band_hz": (0, 200), "data_decimation": 4}, "band_hz must be at most 32 Hz at its upper end"),
         ({"n_actuators": 0}, "n_actuators must be a whole number from 1"),
-        ({"expected_delay_s": "soon"}, "expected_delay_s must be a number"),
+        ({"expected_delay_s": "soon"}, "expected_delay_s must be a finite number in seconds"),
     ],
 )
 def test_settings_that_cannot_be_are_refused(change, message):

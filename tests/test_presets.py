@@ -55,7 +55,7 @@ def test_a_preset_is_settings() -> None:
 def test_an_unknown_preset_or_setting_is_told_with_those_there_are() -> None:
     with pytest.raises(SettingError, match=r"preset: expected one of paper, paper-fast, found 'papr' \(did you mean "):
         preset("papr")
-    with pytest.raises(SettingError, match=r"preset: no such setting: windw \(did you mean 'window'\?\)"):
+    with pytest.raises(SettingError, match=r"unknown setting windw \(did you mean 'window'\?\)"):
         preset("paper", windw="hann")
 
 

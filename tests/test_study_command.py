@@ -159,8 +159,8 @@ NONSENSE = [
         "hann,hanning",
         "window must be one of boxcar, hann, hamming, blackman, flattop, tukey, not 'hanning'",
     ),
-    ("--weight-powers", "2,x", "weight_power must be a whole number, not 'x'"),
-    ("--weight-powers", "0", "weight_power must be a whole number from 1 to 2**32 - 1, not 0"),
+    ("--weight-powers", "2,x", "--weight-powers must be a whole number, not 'x'"),
+    ("--weight-powers", "0", "--weight-powers must be a whole number from 1 to 2**32 - 1, not 0"),
 ]
 
 
@@ -185,7 +185,7 @@ def test_nonsense_is_misuse_in_one_line_and_nothing_is_made(
         (["--rate", "100", "--resample", "100"], "--resample interpolates the file's time stamps and excludes --rate"),
         (["--no-figures"], "--no-figures speaks of what -o DIR writes: give -o DIR"),
         (["--combined", "4", "0"], "expected a whole number from 1 on, found '0'"),
-        (["--band", "20", "1"], "band_hz must be 0 <= low <= high in Hz, found 20 to 1"),
+        (["--band", "20", "1"], "--band must be two finite frequencies 0 <= low <= high, not (20, 1)"),
         (["--true-amplitude", "-1"], "expected a positive number, found '-1'"),
         (["--true-delay", "late"], "expected a number, found 'late'"),
     ],

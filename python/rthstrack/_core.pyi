@@ -1,11 +1,11 @@
 """The compiled core. Use the functions of `rthstrack`, which check and convert what they are given."""
 
-from typing import Any, final
+from typing import Any, TypedDict, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rthstrack.evaluation.settings import MonitorSettings, Settings
+from rthstrack.evaluation.settings import MonitorSettings, MovingSettings, Settings
 from rthstrack.virtual_test import parts as virtual_test
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "bridged",
     "causal_decimate",
     "check_test",
+    "checked_settings",
     "choose_factors",
     "evaluate_moving",
     "frequency_response",
@@ -28,6 +29,7 @@ __all__ = [
     "prior_bounds",
     "read_text",
     "sdof",
+    "settings_table",
     "shear_building",
 ]
 
@@ -43,6 +45,24 @@ _Readings = tuple[
 _Spectra = tuple[_Array, _Array, NDArray[np.complex128], NDArray[np.complex128]]
 
 __version__: str
+
+class SettingRow(TypedDict):
+    name: str
+    kind: str
+    choices: list[str]
+    least: int
+    most: int
+    optional: bool
+    required: bool
+    in_study: bool
+    expected: str
+    unit: str
+    label: str
+    help: str
+    default: Any
+
+def settings_table(of: str) -> list[SettingRow]: ...
+def checked_settings(of: str, given: object) -> dict[str, Any]: ...
 
 @final
 class Evaluator:
@@ -163,10 +183,7 @@ def evaluate_moving(
     target: NDArray[Any],
     measured: NDArray[Any],
     rate_hz: float,
-    window_s: float,
-    hop_s: float,
-    minimum_std_ratio: float,
-    settings: Settings,
+    settings: MovingSettings,
 ) -> _Readings: ...
 
 _ResponseSettings = tuple[float | None, float, str, str, float | None, bool]

@@ -1,6 +1,6 @@
 //! What goes in.
 
-use rthstrack::{Detrend, Estimator, MonitorConfig, Window};
+use rthstrack::{Detrend, Estimator, EvaluatorConfig, MonitorConfig, Window};
 
 use crate::boundary::{guarded, is_sound_out};
 use crate::status::rthstrack_status::{self, *};
@@ -50,11 +50,6 @@ pub enum rthstrack_estimator {
     RTHSTRACK_ESTIMATOR_LEAST_SQUARES = 2,
 }
 
-const WINDOWS: [Window; 6] =
-    [Window::Boxcar, Window::Hann, Window::Hamming, Window::Blackman, Window::Flattop, Window::Tukey];
-const DETRENDS: [Detrend; 3] = [Detrend::None, Detrend::Mean, Detrend::Linear];
-const ESTIMATORS: [Estimator; 3] = [Estimator::Fei, Estimator::Aligned, Estimator::LeastSquares];
-
 /// The settings of a monitor. Fill it by rthstrack_monitor_config_default, then change what is to differ.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -101,7 +96,8 @@ impl rthstrack_monitor_config {
     const SIZE: usize = std::mem::size_of::<Self>();
 
     fn of(config: &MonitorConfig) -> Self {
-        let (band_low_hz, band_high_hz) = config.band_hz.unwrap_or((f64::NAN, f64::NAN));
+        let evaluator = &config.evaluator;
+        let (band_low_hz, band_high_hz) = evaluator.band_hz.unwrap_or((f64::NAN, f64::NAN));
         Self {
             size: Self::SIZE as u32,
             abi_version: RTHSTRACK_ABI_VERSION,
@@ -110,15 +106,15 @@ impl rthstrack_monitor_config {
             update_hz: config.update_hz,
             band_low_hz,
             band_high_hz,
-            max_delay_s: config.max_delay_s,
-            expected_delay_s: config.expected_delay_s.unwrap_or(f64::NAN),
+            max_delay_s: evaluator.max_delay_s,
+            expected_delay_s: evaluator.expected_delay_s.unwrap_or(f64::NAN),
             minimum_amplitude: config.minimum_amplitude,
-            window: code(&WINDOWS, config.window),
-            detrend: code(&DETRENDS, config.detrend),
-            estimator: code(&ESTIMATORS, config.estimator),
+            window: code(&Window::NAMES, evaluator.window),
+            detrend: code(&Detrend::NAMES, evaluator.detrend),
+            estimator: code(&Estimator::NAMES, evaluator.estimator),
             n_actuators: config.n_actuators as u32,
-            data_decimation: config.data_decimation as u32,
-            frequency_decimation: config.frequency_decimation as u32,
+            data_decimation: evaluator.data_decimation as u32,
+            frequency_decimation: evaluator.frequency_decimation as u32,
         }
     }
 
@@ -143,28 +139,33 @@ impl rthstrack_monitor_config {
             rate_hz: self.rate_hz,
             window_s: self.window_s,
             update_hz: self.update_hz,
-            band_hz: whole.then_some(band_hz),
-            window: choice("window", &WINDOWS, self.window, "a RTHSTRACK_WINDOW_...")?,
-            detrend: choice("detrend", &DETRENDS, self.detrend, "a RTHSTRACK_DETREND_...")?,
-            estimator: choice("estimator", &ESTIMATORS, self.estimator, "a RTHSTRACK_ESTIMATOR_...")?,
-            data_decimation: self.data_decimation as usize,
-            frequency_decimation: self.frequency_decimation as usize,
-            max_delay_s: self.max_delay_s,
-            expected_delay_s: (!self.expected_delay_s.is_nan()).then_some(self.expected_delay_s),
             minimum_amplitude: self.minimum_amplitude,
             n_actuators: self.n_actuators as usize,
+            evaluator: EvaluatorConfig {
+                band_hz: whole.then_some(band_hz),
+                window: choice("window", &Window::NAMES, self.window, "a RTHSTRACK_WINDOW_...")?,
+                detrend: choice("detrend", &Detrend::NAMES, self.detrend, "a RTHSTRACK_DETREND_...")?,
+                estimator: choice("estimator", &Estimator::NAMES, self.estimator, "a RTHSTRACK_ESTIMATOR_...")?,
+                data_decimation: self.data_decimation as usize,
+                frequency_decimation: self.frequency_decimation as usize,
+                max_delay_s: self.max_delay_s,
+                expected_delay_s: (!self.expected_delay_s.is_nan()).then_some(self.expected_delay_s),
+                ..MonitorConfig::default().evaluator
+            },
         })
     }
 }
 
 /// Place of a choice in its list, which is its number in C.
-fn code<T: PartialEq>(choices: &[T], chosen: T) -> i32 {
-    choices.iter().position(|c| *c == chosen).map_or(-1, |place| place as i32)
+fn code<T: PartialEq>(names: &[(&str, T)], chosen: T) -> i32 {
+    names.iter().position(|(_, choice)| *choice == chosen).map_or(-1, |place| place as i32)
 }
 
-fn choice<T: Copy>(name: &str, choices: &[T], code: i32, expected: &str) -> Result<T, String> {
-    let found = usize::try_from(code).ok().and_then(|place| choices.get(place));
-    found.copied().ok_or_else(|| format!("{name} must be {expected}, 0 to {}, not {code}", choices.len() - 1))
+fn choice<T: Copy>(name: &str, names: &[(&str, T)], code: i32, expected: &str) -> Result<T, String> {
+    let found = usize::try_from(code).ok().and_then(|place| names.get(place));
+    found
+        .map(|(_, choice)| *choice)
+        .ok_or_else(|| format!("{name} must be {expected}, 0 to {}, not {code}", names.len() - 1))
 }
 
 /// Fills the settings with their defaults. `size` is sizeof *config, `abi_version` is RTHSTRACK_ABI_VERSION, both as
@@ -216,18 +217,18 @@ mod tests {
             RTHSTRACK_WINDOW_TUKEY,
         ];
         for ((name, window), number) in Window::NAMES.iter().zip(windows) {
-            assert_eq!(code(&WINDOWS, *window), number as i32);
+            assert_eq!(code(&Window::NAMES, *window), number as i32);
             assert!(format!("{number:?}").to_lowercase().ends_with(name));
         }
         for ((name, detrend), number) in
             Detrend::NAMES.iter().zip([RTHSTRACK_DETREND_NONE, RTHSTRACK_DETREND_MEAN, RTHSTRACK_DETREND_LINEAR])
         {
-            assert_eq!(code(&DETRENDS, *detrend), number as i32);
+            assert_eq!(code(&Detrend::NAMES, *detrend), number as i32);
             assert!(format!("{number:?}").to_lowercase().ends_with(name));
         }
         let estimators = [RTHSTRACK_ESTIMATOR_FEI, RTHSTRACK_ESTIMATOR_ALIGNED, RTHSTRACK_ESTIMATOR_LEAST_SQUARES];
         for ((name, estimator), number) in Estimator::NAMES.iter().zip(estimators) {
-            assert_eq!(code(&ESTIMATORS, *estimator), number as i32);
+            assert_eq!(code(&Estimator::NAMES, *estimator), number as i32);
             assert!(format!("{number:?}").to_lowercase().ends_with(name));
         }
     }

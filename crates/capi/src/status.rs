@@ -181,6 +181,7 @@ mod tests {
     #[test]
     fn texts_say_whether_there_is_a_number() {
         for kind in Reason::KINDS {
+            // SAFETY: never null, and lives as long as the library.
             let text = unsafe { CStr::from_ptr(rthstrack_reason_text(kind.number)) }.to_str().unwrap();
             assert_eq!(text.starts_with("not determined: "), kind.number < 100, "{text}");
             assert_eq!(text.starts_with("no interval: "), kind.number >= 100, "{text}");

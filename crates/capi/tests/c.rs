@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 use rthstrack::dynamics::{
     Actuator, Compensation, Converter, Delay, Dynamics, Law, Motion, SampledActuator, ServoHydraulic,
 };
-use rthstrack::{Estimator, Monitor, MonitorConfig, Reading};
+use rthstrack::{Estimator, EvaluatorConfig, Monitor, MonitorConfig, Reading};
 
 const STRICT: [&str; 5] = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror"];
 const RATE_HZ: f64 = 1024.0;
@@ -183,9 +183,12 @@ fn readings_of_the_core(seconds: usize) -> Vec<Reading> {
     let monitor = Monitor::new(MonitorConfig {
         rate_hz: RATE_HZ,
         window_s: 2.0,
-        band_hz: Some((0.0, 32.0)),
-        estimator: Estimator::LeastSquares,
-        data_decimation: 8,
+        evaluator: EvaluatorConfig {
+            band_hz: Some((0.0, 32.0)),
+            estimator: Estimator::LeastSquares,
+            data_decimation: 8,
+            ..MonitorConfig::default().evaluator
+        },
         ..Default::default()
     })
     .unwrap();

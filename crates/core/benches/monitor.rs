@@ -89,10 +89,13 @@ fn measure(case: &Case) -> String {
         rate_hz: RATE_HZ,
         window_s,
         update_hz: 64.0,
-        band_hz: Some((0.0, 32.0)),
-        estimator,
-        data_decimation,
         n_actuators,
+        evaluator: EvaluatorConfig {
+            band_hz: Some((0.0, 32.0)),
+            estimator,
+            data_decimation,
+            ..MonitorConfig::default().evaluator
+        },
         ..Default::default()
     };
     let monitor: &'static Monitor = Box::leak(Box::new(Monitor::new(config).unwrap()));

@@ -126,11 +126,6 @@ pub enum Error {
         /// Upper end, in hertz.
         high_hz: f64,
     },
-    /// The weight power is outside 1 to 16.
-    WeightPower {
-        /// The power given.
-        found: u32,
-    },
     /// A duration or ratio is out of range.
     Setting {
         /// Name of the setting.
@@ -139,6 +134,22 @@ pub enum Error {
         expected: String,
         /// What it was.
         found: f64,
+    },
+    /// A setting is of another kind than it must be.
+    Value {
+        /// Name of the setting.
+        name: &'static str,
+        /// What it must be.
+        expected: String,
+        /// What it was, as it is written.
+        found: String,
+    },
+    /// There is no setting of this name.
+    UnknownSetting {
+        /// The name given.
+        name: String,
+        /// Those that there are.
+        known: String,
     },
     /// A setting that another one excludes.
     Combination {
@@ -235,10 +246,11 @@ impl fmt::Display for Error {
             Error::Band { low_hz, high_hz } => {
                 write!(f, "band_hz must be two finite frequencies 0 <= low <= high, not ({low_hz}, {high_hz})")
             }
-            Error::WeightPower { found } => {
-                write!(f, "weight_power must be a whole number from 1 to 16, not {found}")
-            }
             Error::Setting { name, expected, found } => write!(f, "{name} must be {expected}, not {found}"),
+            Error::Value { name, expected, found } => write!(f, "{name} must be {expected}, not {found}"),
+            Error::UnknownSetting { name, known } => {
+                write!(f, "unknown setting {}: expected {known}", name.escape_debug())
+            }
             Error::Combination { name, value, needed } => {
                 write!(f, "{name} = {value} goes only with {needed}; change one of them")
             }

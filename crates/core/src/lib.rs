@@ -9,7 +9,7 @@
 //! 2. [`window`]: detrending and windows.
 //! 3. [`decimate`]: P, as a short cascade or as the paper's Chebyshev filter.
 //! 4. `spectrum`: Q by folding, the transform, the kept bins.
-//! 5. [`settings`]: what an evaluation is told; [`tracking`]: what it answers; [`reason`]: why a number is missing.
+//! 5. [`setting`]: what a setting is; [`settings`]: what an evaluation is told; [`tracking`]: what it answers; [`reason`]: why a number is missing.
 //! 6. `weigh`: the sums of Eqs 7 and 12, amplitude and delay from them (Eqs 10 and 11).
 //! 7. [`bad_samples`]: spikes, dropouts, frozen, clipped and held samples, which the next step leaves out.
 //! 8. `alignment`: the estimators that shift the target before it is windowed; `lag` finds where to start, `lagrange` reads
@@ -50,6 +50,7 @@ pub mod pair;
 mod quantile;
 pub mod reason;
 pub mod response;
+pub mod setting;
 pub mod settings;
 pub mod slopes;
 mod spectrum;

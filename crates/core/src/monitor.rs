@@ -10,71 +10,42 @@
 //! window's last samples.
 
 use crate::causal::{CausalDecimator, CausalState, Ring};
-use crate::decimate::Decimator;
 use crate::error::{Error, Result};
 use crate::evaluator::{Evaluator, EvaluatorState};
 use crate::pair::{MIN_SAMPLES, Pair, check_rate, is_fourth_power};
 use crate::reason::Reason;
+use crate::setting::concerns::{MONITOR, REQUIRED};
+use crate::setting::{Configuration, Kind};
 use crate::settings::{Estimator, EvaluatorConfig, check_expected_delay};
 use crate::sums;
 use crate::tracking::Tracking;
-use crate::window::{Detrend, Window};
+use crate::window::Detrend;
 
 /// Samples after decimation that the windows of all actuators may hold.
 const MAX_SAMPLES: f64 = 4_194_304.0;
 /// P times the number of actuators: some 500 bytes each.
 const MAX_DECIMATION: usize = 262_144;
 
-/// The user's numbers.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MonitorConfig {
-    /// Incoming samples a second.
-    pub rate_hz: f64,
-    /// Length of the window, in seconds.
-    pub window_s: f64,
-    /// Readings a second.
-    pub update_hz: f64,
-    /// Lowest and highest frequency kept, both included, in hertz. With P above 1 the highest is rate / (4 P) at most, and that where
-    /// none is given; least squares leaves an upper end of just this, with a lower end of 0, to the decimator's slope.
-    pub band_hz: Option<(f64, f64)>,
-    /// Window over the samples.
-    pub window: Window,
-    /// What is subtracted before the window.
-    pub detrend: Detrend,
-    /// How gain and delay are estimated.
-    pub estimator: Estimator,
-    /// P, a power of two: samples are decimated as they come ([`CausalDecimator`]), and evaluated at rate / P.
-    pub data_decimation: usize,
-    /// Q, a power of two: keeps every Q-th bin.
-    pub frequency_decimation: usize,
-    /// Largest delay or lead looked for by the estimators that shift the target, in seconds.
-    pub max_delay_s: f64,
-    /// Of delays that fit equally well (the target is one tone), the one nearest to this is taken, in seconds.
-    pub expected_delay_s: Option<f64>,
-    /// A window is judged where the target's amplitude in it is at least this: sqrt(2) times its standard deviation, which is the
-    /// amplitude of a sine. In the unit of the signals.
-    pub minimum_amplitude: f64,
-    /// Actuators that are stepped together.
-    pub n_actuators: usize,
-}
-
-impl Default for MonitorConfig {
-    fn default() -> Self {
-        Self {
-            rate_hz: 1024.0,
-            window_s: 4.0,
-            update_hz: 64.0,
-            band_hz: None,
-            window: Window::Boxcar,
-            detrend: Detrend::Mean,
-            estimator: Estimator::Fei,
-            data_decimation: 1,
-            frequency_decimation: 1,
-            max_delay_s: 0.25,
-            expected_delay_s: None,
-            minimum_amplitude: 0.0,
-            n_actuators: 1,
-        }
+crate::configuration! {
+    /// The user's numbers.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub struct MonitorConfig for MONITOR => {
+        /// Incoming samples a second.
+        rate_hz: f64 = 1024.0, Kind::Positive, "Hz", "Rate", MONITOR | REQUIRED;
+        /// Length of the window.
+        window_s: f64 = 4.0, Kind::Positive, "s", "Window", MONITOR;
+        /// Readings a second, of each actuator.
+        update_hz: f64 = 64.0, Kind::Positive, "Hz", "Readings", MONITOR;
+        /// A window is judged where the target's amplitude in it is at least this: sqrt(2) times its standard deviation, which is the
+        /// amplitude of a sine. In the unit of the signals.
+        minimum_amplitude: f64 = 0.0, Kind::NotNegative, "", "Least amplitude judged", MONITOR;
+        /// Actuators that are stepped together.
+        n_actuators: usize = 1, Kind::Whole(1, u32::MAX as u64), "", "Actuators", MONITOR;
+        with
+        /// How each window is evaluated. P is carried out as samples come ([`CausalDecimator`]), and the window evaluated at rate / P.
+        /// With P above 1 the band's upper end is rate / (4 P) at most, and that where none is given; least squares leaves an upper
+        /// end of just this, with a lower end of 0, to the decimator's slope.
+        evaluator: EvaluatorConfig = EvaluatorConfig { detrend: Detrend::Mean, ..EvaluatorConfig::default() };
     }
 }
 
@@ -107,9 +78,10 @@ impl Reading {
 /// The checked plan: one for any number of streams of this rate.
 ///
 /// ```
-/// use rthstrack::{Estimator, Monitor, MonitorConfig};
+/// use rthstrack::{Estimator, EvaluatorConfig, Monitor, MonitorConfig};
 /// let estimator = Estimator::LeastSquares;
-/// let monitor = Monitor::new(MonitorConfig { estimator, data_decimation: 8, update_hz: 16.0, ..Default::default() })?;
+/// let evaluator = EvaluatorConfig { estimator, data_decimation: 8, ..MonitorConfig::default().evaluator };
+/// let monitor = Monitor::new(MonitorConfig { update_hz: 16.0, evaluator, ..Default::default() })?;
 /// let mut state = monitor.state();
 /// // Measured comes 20 ms later and 5 % too small.
 /// let motion = |t: f64| (9.0 * t).sin() + 0.3 * (23.0 * t).sin() + 0.2 * (41.0 * t).cos();
@@ -171,18 +143,17 @@ impl Monitor {
     /// a band that the decimator does not keep; whatever [`Evaluator::new`] refuses.
     pub fn new(config: MonitorConfig) -> Result<Self> {
         check_rate(config.rate_hz)?;
+        config.check_each()?;
         let setting = |name, expected: String, found| Err(Error::Setting { name, expected, found });
-        if config.n_actuators == 0 {
-            return setting("n_actuators", "at least 1".to_owned(), 0.0);
-        }
+        let data_decimation = config.evaluator.data_decimation;
         // The filters of all actuators must fit into memory, too.
         let most = MAX_DECIMATION / config.n_actuators.min(MAX_DECIMATION);
-        if config.data_decimation > most {
+        if data_decimation > most {
             let expected = format!("at most {most} with {} actuators", config.n_actuators);
-            return setting("data_decimation", expected, config.data_decimation as f64);
+            return setting("data_decimation", expected, data_decimation as f64);
         }
-        let decimator = CausalDecimator::new(config.data_decimation)?;
-        let rate_hz = config.rate_hz / config.data_decimation as f64;
+        let decimator = CausalDecimator::new(data_decimation)?;
+        let rate_hz = config.rate_hz / data_decimation as f64;
         let samples = (config.window_s * rate_hz).round();
         let most = MAX_SAMPLES / config.n_actuators as f64;
         if !(samples >= MIN_SAMPLES as f64 && samples <= most) {
@@ -194,14 +165,10 @@ impl Monitor {
             let expected = format!("above 0 and at most {rate_hz} Hz, the rate after decimation by P");
             return setting("update_hz", expected, config.update_hz);
         }
-        if !(config.minimum_amplitude.is_finite() && config.minimum_amplitude >= 0.0) {
-            let expected = "zero or a positive amplitude".to_owned();
-            return setting("minimum_amplitude", expected, config.minimum_amplitude);
-        }
         let window = samples as usize;
-        let evaluator = Evaluator::new(window, rate_hz, config.evaluator()?)?;
+        let evaluator = Evaluator::new(window, rate_hz, config.decimated()?)?;
         // `fei` has not seen it.
-        check_expected_delay(config.expected_delay_s, config.max_delay_s)?;
+        check_expected_delay(config.evaluator.expected_delay_s, config.evaluator.max_delay_s)?;
         let before = evaluator.samples_before();
         let hop = (rate_hz / config.update_hz).round().max(1.0) as usize;
         Ok(Self { config, decimator, evaluator, window, before, hop })
@@ -396,17 +363,18 @@ impl Monitor {
 
 impl MonitorConfig {
     /// What evaluates a window of decimated samples.
-    fn evaluator(&self) -> Result<EvaluatorConfig> {
-        let kept_hz = self.rate_hz / (4 * self.data_decimation) as f64;
-        let decimated = self.data_decimation > 1;
-        if let Some((low_hz, high_hz)) = self.band_hz
+    fn decimated(&self) -> Result<EvaluatorConfig> {
+        let EvaluatorConfig { estimator, data_decimation, band_hz, .. } = self.evaluator;
+        let kept_hz = self.rate_hz / (4 * data_decimation) as f64;
+        let decimated = data_decimation > 1;
+        if let Some((low_hz, high_hz)) = band_hz
             && decimated
             && high_hz > kept_hz * (1.0 + 1e-9)
         {
             let expected = format!("at most {kept_hz} Hz at its upper end, rate / (4 P); lower P");
             return Err(Error::Setting { name: "band_hz", expected, found: high_hz.max(low_hz) });
         }
-        let band_hz = match (self.estimator, self.band_hz) {
+        let band_hz = match (estimator, band_hz) {
             (Estimator::Fei | Estimator::Aligned, None) if decimated => Some((0.0, kept_hz)),
             // What the decimator cuts off needs no bins to be cut off again: sums over samples are cheaper.
             (Estimator::LeastSquares, Some((low_hz, high_hz)))
@@ -417,17 +385,11 @@ impl MonitorConfig {
             (_, band_hz) => band_hz,
         };
         Ok(EvaluatorConfig {
-            estimator: self.estimator,
             data_decimation: 1,
-            frequency_decimation: self.frequency_decimation,
-            decimator: Decimator::Spectral,
-            window: self.window,
-            detrend: self.detrend,
             band_hz,
-            max_delay_s: self.max_delay_s,
             // `fei` looks for no delay; a monitor may change its estimator and keep the rest.
-            expected_delay_s: self.expected_delay_s.filter(|_| self.estimator != Estimator::Fei),
-            ..EvaluatorConfig::default()
+            expected_delay_s: self.evaluator.expected_delay_s.filter(|_| estimator != Estimator::Fei),
+            ..self.evaluator
         })
     }
 }

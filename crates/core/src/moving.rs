@@ -5,25 +5,24 @@ use crate::error::{Error, Result};
 use crate::evaluator::Evaluator;
 use crate::pair::{MIN_SAMPLES, Pair};
 use crate::reason::Reason;
+use crate::setting::concerns::{EVALUATION, MOVING};
+use crate::setting::{Configuration, Kind};
 use crate::settings::{Estimator, EvaluatorConfig};
 use crate::tracking::Tracking;
 
-/// The user's numbers for a moving evaluation.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MovingConfig {
-    /// Length of the window, in seconds.
-    pub window_s: f64,
-    /// From one window to the next, in seconds.
-    pub hop_s: f64,
-    /// A window is judged where the target's standard deviation in it is at least this share of the whole record's.
-    pub minimum_std_ratio: f64,
-    /// How each window is evaluated.
-    pub evaluator: EvaluatorConfig,
-}
-
-impl Default for MovingConfig {
-    fn default() -> Self {
-        Self { window_s: 4.0, hop_s: 0.25, minimum_std_ratio: 0.05, evaluator: EvaluatorConfig::default() }
+crate::configuration! {
+    /// The user's numbers for a moving evaluation.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub struct MovingConfig for EVALUATION => {
+        /// Length of the window.
+        window_s: f64 = 4.0, Kind::Positive, "s", "Moving windows", MOVING;
+        /// From one window to the next.
+        hop_s: f64 = 0.25, Kind::Positive, "s", "One moving window every", MOVING;
+        /// A window is judged where the target's standard deviation in it is at least this share of the whole record's.
+        minimum_std_ratio: f64 = 0.05, Kind::Share, "", "Least motion in a window", MOVING;
+        with
+        /// How each window is evaluated.
+        evaluator: EvaluatorConfig = EvaluatorConfig::default();
     }
 }
 
@@ -79,11 +78,8 @@ pub fn evaluate_moving(pair: &Pair<'_>, config: &MovingConfig) -> Result<MovingT
     let (n, rate_hz) = (pair.n_samples(), pair.rate_hz());
     let window = samples_of("window_s", config.window_s, rate_hz, MIN_SAMPLES, n)?;
     let hop = samples_of("hop_s", config.hop_s, rate_hz, 1, usize::MAX)?;
+    config.check_each()?;
     let ratio = config.minimum_std_ratio;
-    if !(ratio.is_finite() && (0.0..1.0).contains(&ratio)) {
-        let expected = "a share from 0 to below 1".to_owned();
-        return Err(Error::Setting { name: "minimum_std_ratio", expected, found: ratio });
-    }
     let evaluator = Evaluator::new(window, rate_hz, config.evaluator)?;
     let mut moving = evaluator.moving(pair, hop);
     let variance = RunningVariance::new(pair.target());

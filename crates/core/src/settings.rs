@@ -1,12 +1,15 @@
-//! The settings of an evaluation, and which of them go together.
+//! The settings of an evaluation, and which of them go together. A new setting is a row of [`EvaluatorConfig`]: options, checks,
+//! defaults, Python's settings, reports and documents are made from it (`make settings` writes what is kept in files).
 
 use crate::bad_samples::found::BadSamples;
 use crate::decimate::Decimator;
 use crate::error::{Error, Result};
+use crate::setting::concerns::{EVALUATION, MONITOR, STUDY};
+use crate::setting::{Configuration, Kind, choices};
 use crate::window::{Detrend, Window};
 
-/// Highest weight power taken.
-pub const MAX_WEIGHT_POWER: u32 = 16;
+/// Whom most settings concern.
+const ALL: u8 = EVALUATION | MONITOR | STUDY;
 
 /// How gain and delay are estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -26,16 +29,12 @@ impl Estimator {
     pub const NAMES: [(&'static str, Estimator); 3] =
         [("fei", Estimator::Fei), ("aligned", Estimator::Aligned), ("least_squares", Estimator::LeastSquares)];
 
-    fn name(self) -> &'static str {
-        Self::NAMES.iter().find(|(_, e)| *e == self).map_or("", |(name, _)| name)
-    }
-
     /// For what is made of the sums of Eq 12 themselves; others need `needed`.
     pub(crate) fn must_be_published(self, needed: &str) -> Result<()> {
         if self == Estimator::Fei {
             return Ok(());
         }
-        Err(Error::Combination { name: "estimator", value: self.name().to_owned(), needed: needed.to_owned() })
+        Err(Error::Combination { name: "estimator", value: self.code().to_owned(), needed: needed.to_owned() })
     }
 }
 
@@ -54,74 +53,53 @@ impl Noise {
     pub const NAMES: [(&'static str, Noise); 2] = [("white", Noise::White), ("coloured", Noise::Coloured)];
 }
 
-/// The user's numbers.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EvaluatorConfig {
-    /// How gain and delay are estimated.
-    pub estimator: Estimator,
-    /// P, a power of two: keeps the frequencies up to rate / (2 P).
-    pub data_decimation: usize,
-    /// Q, a power of two: keeps every Q-th bin.
-    pub frequency_decimation: usize,
-    /// How P is carried out.
-    pub decimator: Decimator,
-    /// l of Eqs 7 and 12, 1 to 16: bins are weighted by |I|^l.
-    pub weight_power: u32,
-    /// Window over the record.
-    pub window: Window,
-    /// What is subtracted before the window.
-    pub detrend: Detrend,
-    /// Lowest and highest frequency kept, both included, in hertz.
-    pub band_hz: Option<(f64, f64)>,
-    /// Largest delay or lead looked for by the estimators that shift the target, in seconds; where the record does not go on beyond
-    /// what is judged, a quarter of that at most.
-    pub max_delay_s: f64,
-    /// Of delays that fit equally well (turns of a motion that is one tone, or nearly), the estimators that shift the target take
-    /// the one nearest to this, in seconds; without it the answer is "ambiguous".
-    pub expected_delay_s: Option<f64>,
-    /// What least squares takes the noise on measured for.
-    pub noise: Noise,
-    /// Standard deviation of the noise on target over that on measured; above zero, least squares is total least squares.
-    pub noise_ratio: f64,
-    /// What the estimators that shift the target do with samples that are no motion.
-    pub bad_samples: BadSamples,
-}
+choices!(Estimator);
+choices!(Noise);
+choices!(Decimator);
+choices!(Window);
+choices!(Detrend);
+choices!(BadSamples);
 
-impl Default for EvaluatorConfig {
-    fn default() -> Self {
-        Self {
-            estimator: Estimator::Fei,
-            data_decimation: 1,
-            frequency_decimation: 1,
-            decimator: Decimator::Spectral,
-            weight_power: 2,
-            window: Window::Boxcar,
-            detrend: Detrend::None,
-            band_hz: None,
-            max_delay_s: 0.25,
-            expected_delay_s: None,
-            noise: Noise::White,
-            noise_ratio: 0.0,
-            bad_samples: BadSamples::LeaveOut,
-        }
+crate::configuration! {
+    /// The user's numbers.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub struct EvaluatorConfig for 0 => {
+        /// How gain and delay are estimated.
+        estimator: Estimator = Estimator::Fei, Kind::Choice(Estimator::CODES), "", "Estimator", ALL;
+        /// P, a power of two: keeps the frequencies up to rate / (2 P); of a monitor up to rate / (4 P).
+        data_decimation: usize = 1, Kind::PowerOfTwo, "", "Data decimation P", EVALUATION | MONITOR;
+        /// Q, a power of two: keeps every Q-th frequency bin.
+        frequency_decimation: usize = 1, Kind::PowerOfTwo, "", "Frequency decimation Q", EVALUATION | MONITOR;
+        /// How P is carried out, exactly on the bins of the undecimated transform or filtered as published.
+        decimator: Decimator = Decimator::Spectral, Kind::Choice(Decimator::CODES), "", "Decimator", EVALUATION | STUDY;
+        /// l of Eqs 7 and 12: bins weigh |target|^l.
+        weight_power: u32 = 2, Kind::Whole(1, 16), "", "Weight power l", EVALUATION;
+        /// Window over the record.
+        window: Window = Window::Boxcar, Kind::Choice(Window::CODES), "", "Window", EVALUATION | MONITOR;
+        /// What is subtracted before the window.
+        detrend: Detrend = Detrend::None, Kind::Choice(Detrend::CODES), "", "Detrend", ALL;
+        /// Lowest and highest frequency judged, both included.
+        band_hz: Option<(f64, f64)> = None, Kind::Band, "Hz", "Band", ALL;
+        /// Largest delay or lead looked for by all estimators but fei; where the record does not go on beyond what is judged, a
+        /// quarter of that at most.
+        max_delay_s: f64 = 0.25, Kind::Positive, "s", "Largest delay looked for", ALL;
+        /// Of delays that fit equally well, the target being one tone, all estimators but fei take the one nearest to this;
+        /// without it the answer is "ambiguous".
+        expected_delay_s: Option<f64> = None, Kind::Number, "s", "Expected delay", ALL;
+        /// What least_squares takes the noise on measured for.
+        noise: Noise = Noise::White, Kind::Choice(Noise::CODES), "", "Noise on measured", EVALUATION | STUDY;
+        /// Standard deviation of the noise on target over that on measured, for least_squares.
+        noise_ratio: f64 = 0.0, Kind::NotNegative, "", "Noise on target over that on measured", EVALUATION | STUDY;
+        /// What all estimators but fei do with spikes, dropouts, frozen and clipped samples, and held ones.
+        bad_samples: BadSamples = BadSamples::LeaveOut, Kind::Choice(BadSamples::CODES), "", "Bad samples", EVALUATION | STUDY;
     }
 }
 
 impl EvaluatorConfig {
     /// What can be said of the settings without a record.
     pub(crate) fn check(&self) -> Result<()> {
-        if !(1..=MAX_WEIGHT_POWER).contains(&self.weight_power) {
-            return Err(Error::WeightPower { found: self.weight_power });
-        }
-        if !(self.max_delay_s.is_finite() && self.max_delay_s > 0.0) {
-            let expected = "a positive duration in seconds".to_owned();
-            return Err(Error::Setting { name: "max_delay_s", expected, found: self.max_delay_s });
-        }
+        self.check_each()?;
         check_expected_delay(self.expected_delay_s, self.max_delay_s)?;
-        if !(self.noise_ratio.is_finite() && self.noise_ratio >= 0.0) {
-            let expected = "zero or a positive number".to_owned();
-            return Err(Error::Setting { name: "noise_ratio", expected, found: self.noise_ratio });
-        }
         let least_squares = self.estimator == Estimator::LeastSquares;
         let needs = |name, value: &str, needed: &str| {
             Err(Error::Combination { name, value: value.to_owned(), needed: needed.to_owned() })

@@ -154,12 +154,15 @@ fn monitoring_allocates_nothing() {
         {
             let config = MonitorConfig {
                 window_s: 1.0,
-                estimator,
-                data_decimation,
-                window,
-                band_hz,
                 minimum_amplitude: 1e-3,
                 n_actuators: 2,
+                evaluator: EvaluatorConfig {
+                    estimator,
+                    data_decimation,
+                    window,
+                    band_hz,
+                    ..MonitorConfig::default().evaluator
+                },
                 ..Default::default()
             };
             let monitor = Monitor::new(config).unwrap();

@@ -138,16 +138,19 @@ fn a_monitor_takes_any_bits() {
             rate_hz,
             window_s: random.pick(&[4.0, 37.0, 64.0, 200.0]) / rate_hz,
             update_hz: rate_hz / random.pick(&[8.0, 8.0, 50.0]),
-            band_hz: random.pick(&[None, None, Some((0.0, rate_hz / 32.0)), Some((low, low + rate_hz / 64.0))]),
-            window: random.pick(&Window::NAMES).1,
-            detrend: random.pick(&Detrend::NAMES).1,
-            estimator: random.pick(&Estimator::NAMES).1,
-            data_decimation: random.pick(&[1, 1, 2, 8]),
-            frequency_decimation: random.pick(&[1, 1, 2]),
-            max_delay_s: random.pick(&[20.0, 3.0, 1000.0]) / rate_hz,
-            expected_delay_s: random.pick(&[None, Some(0.0), Some(-3.0 / rate_hz)]),
             minimum_amplitude: random.pick(&[0.0, 0.0, 0.5]),
             n_actuators,
+            evaluator: EvaluatorConfig {
+                band_hz: random.pick(&[None, None, Some((0.0, rate_hz / 32.0)), Some((low, low + rate_hz / 64.0))]),
+                window: random.pick(&Window::NAMES).1,
+                detrend: random.pick(&Detrend::NAMES).1,
+                estimator: random.pick(&Estimator::NAMES).1,
+                data_decimation: random.pick(&[1, 1, 2, 8]),
+                frequency_decimation: random.pick(&[1, 1, 2]),
+                max_delay_s: random.pick(&[20.0, 3.0, 1000.0]) / rate_hz,
+                expected_delay_s: random.pick(&[None, Some(0.0), Some(-3.0 / rate_hz)]),
+                ..MonitorConfig::default().evaluator
+            },
         };
         let Ok(monitor) = Monitor::new(config) else { continue };
         let mut state = monitor.state();

@@ -69,12 +69,15 @@ fn configs() -> Vec<MonitorConfig> {
                     rate_hz: RATE_HZ,
                     window_s: 3.0,
                     update_hz: 4.0,
-                    band_hz: Some((0.2, 16.0)),
-                    window,
-                    detrend,
-                    estimator,
-                    data_decimation,
-                    frequency_decimation,
+                    evaluator: EvaluatorConfig {
+                        band_hz: Some((0.2, 16.0)),
+                        window,
+                        detrend,
+                        estimator,
+                        data_decimation,
+                        frequency_decimation,
+                        ..MonitorConfig::default().evaluator
+                    },
                     ..Default::default()
                 });
             }
@@ -89,7 +92,7 @@ fn each_reading_is_the_batch_evaluation_of_its_window_of_causally_decimated_samp
     for config in configs() {
         let monitor = Monitor::new(config).unwrap();
         let readings = readings(&monitor, &target, &measured);
-        let p = config.data_decimation;
+        let p = config.evaluator.data_decimation;
         let decimator = CausalDecimator::new(p).unwrap();
         let (x, y) = (decimator.process(&target), decimator.process(&measured));
         let rate_hz = RATE_HZ / p as f64;
@@ -97,11 +100,11 @@ fn each_reading_is_the_batch_evaluation_of_its_window_of_causally_decimated_samp
         let hop = (rate_hz / config.update_hz).round() as usize;
         assert_eq!(readings.len(), (x.len() - n) / hop + 1, "{config:?}");
         let evaluator = EvaluatorConfig {
-            estimator: config.estimator,
-            frequency_decimation: config.frequency_decimation,
-            window: config.window,
-            detrend: config.detrend,
-            band_hz: config.band_hz,
+            estimator: config.evaluator.estimator,
+            frequency_decimation: config.evaluator.frequency_decimation,
+            window: config.evaluator.window,
+            detrend: config.evaluator.detrend,
+            band_hz: config.evaluator.band_hz,
             ..Default::default()
         };
         for (k, reading) in readings.iter().enumerate() {
@@ -113,7 +116,7 @@ fn each_reading_is_the_batch_evaluation_of_its_window_of_causally_decimated_samp
             assert!(same(reading.centre_s, centre / RATE_HZ), "{context}: {} {}", reading.centre_s, centre / RATE_HZ);
             // As the last window of a record that ends with it.
             let (record_x, record_y) = (&x[..start + n], &y[..start + n]);
-            if config.estimator == Estimator::Fei {
+            if config.evaluator.estimator == Estimator::Fei {
                 let plan = Evaluator::new(n, rate_hz, evaluator).unwrap();
                 let pair = Pair::new(&record_x[start..], &record_y[start..], rate_hz).unwrap();
                 let t = plan.evaluate(&mut plan.state(), &pair).unwrap();
@@ -147,10 +150,13 @@ fn drift_after(n: usize, estimator: Estimator) {
         rate_hz: 1024.0,
         window_s: 0.25,
         update_hz: 64.0,
-        band_hz: Some((0.0, 32.0)),
-        max_delay_s: 0.03,
-        estimator,
-        data_decimation: 8,
+        evaluator: EvaluatorConfig {
+            band_hz: Some((0.0, 32.0)),
+            max_delay_s: 0.03,
+            estimator,
+            data_decimation: 8,
+            ..MonitorConfig::default().evaluator
+        },
         ..Default::default()
     };
     let monitor = Monitor::new(config).unwrap();
@@ -191,7 +197,11 @@ fn nothing_drifts() {
 #[test]
 fn any_split_into_blocks_gives_the_same_bits() {
     let (target, measured) = signals(3000);
-    let config = MonitorConfig { estimator: Estimator::LeastSquares, n_actuators: 2, ..configs()[4] };
+    let config = MonitorConfig {
+        n_actuators: 2,
+        evaluator: EvaluatorConfig { estimator: Estimator::LeastSquares, ..configs()[4].evaluator },
+        ..configs()[4]
+    };
     let monitor = Monitor::new(config).unwrap();
     // Two actuators side by side, the second 100 samples behind.
     let rows = |s: &[f64]| (100..s.len()).flat_map(|i| [s[i], s[i - 100]]).collect::<Vec<f64>>();
@@ -234,8 +244,8 @@ fn a_sample_that_is_no_number_spoils_the_windows_that_hold_it_and_no_other() {
             x[1500] = bad;
             y[1501] = bad;
             let spoilt = readings(&monitor, &x, &y);
-            let p = config.data_decimation as u64;
-            let delay = CausalDecimator::new(config.data_decimation).unwrap().delay() as u64;
+            let p = config.evaluator.data_decimation as u64;
+            let delay = CausalDecimator::new(config.evaluator.data_decimation).unwrap().delay() as u64;
             let span = (config.window_s * RATE_HZ / p as f64).round() as u64 * p + 2 * delay;
             for (a, b) in clean.iter().zip(&spoilt) {
                 assert_eq!(a.index, b.index);
@@ -246,7 +256,7 @@ fn a_sample_that_is_no_number_spoils_the_windows_that_hold_it_and_no_other() {
                     continue;
                 }
                 // Estimators that shift the target look at what comes before the window, as far as it is there.
-                let before = if config.estimator == Estimator::Fei { 0 } else { 2 * RATE_HZ as u64 };
+                let before = if config.evaluator.estimator == Estimator::Fei { 0 } else { 2 * RATE_HZ as u64 };
                 if (1500..1501 + span + before).contains(&a.index) {
                     let (a, b) = (&a.tracking, &b.tracking);
                     assert_eq!(a.amplitude.is_nan(), b.amplitude.is_nan(), "{bad} {config:?} {a:?} {b:?}");
@@ -280,16 +290,30 @@ fn one_tone_is_ambiguous_until_the_delay_to_expect_is_told() {
         (0..4096).map(|i| (std::f64::consts::TAU * 6.0 * (f64::from(i) / 1024.0 - delay)).sin()).collect()
     };
     let (target, measured) = (tone(0.0), tone(0.020));
-    let config = MonitorConfig { estimator: Estimator::LeastSquares, window_s: 2.0, ..Default::default() };
+    let config = MonitorConfig {
+        window_s: 2.0,
+        evaluator: EvaluatorConfig { estimator: Estimator::LeastSquares, ..MonitorConfig::default().evaluator },
+        ..Default::default()
+    };
     let last = |config| *readings(&Monitor::new(config).unwrap(), &target, &measured).last().unwrap();
     assert!(matches!(last(config).tracking.reason, Some(Reason::Ambiguous { .. })));
-    let told = last(MonitorConfig { expected_delay_s: Some(0.0), ..config });
+    let told = last(MonitorConfig {
+        evaluator: EvaluatorConfig { expected_delay_s: Some(0.0), ..config.evaluator },
+        ..config
+    });
     assert!((told.tracking.delay_s - 0.020).abs() < 1e-9, "{told:?}");
-    let a_period_later = last(MonitorConfig { expected_delay_s: Some(0.18), ..config });
+    let a_period_later = last(MonitorConfig {
+        evaluator: EvaluatorConfig { expected_delay_s: Some(0.18), ..config.evaluator },
+        ..config
+    });
     assert!((a_period_later.tracking.delay_s - 0.020 - 1.0 / 6.0).abs() < 1e-9, "{a_period_later:?}");
     // What judges a window knows it, too; `fei` looks for none.
     for (estimator, expected) in [(Estimator::Aligned, Some(0.01)), (Estimator::Fei, None)] {
-        let monitor = Monitor::new(MonitorConfig { estimator, expected_delay_s: Some(0.01), ..config }).unwrap();
+        let monitor = Monitor::new(MonitorConfig {
+            evaluator: EvaluatorConfig { estimator, expected_delay_s: Some(0.01), ..config.evaluator },
+            ..config
+        })
+        .unwrap();
         assert_eq!(monitor.evaluator().config().expected_delay_s, expected);
     }
 }
@@ -332,32 +356,67 @@ fn settings_that_cannot_be_are_refused_with_what_they_must_be() {
         (MonitorConfig { window_s: f64::NAN, ..config }, "window_s must be from"),
         (MonitorConfig { update_hz: 0.0, ..config }, "update_hz must be above 0 and at most 1024 Hz"),
         (
-            MonitorConfig { update_hz: 200.0, data_decimation: 8, ..config },
+            MonitorConfig {
+                update_hz: 200.0,
+                evaluator: EvaluatorConfig { data_decimation: 8, ..config.evaluator },
+                ..config
+            },
             "update_hz must be above 0 and at most 128 Hz",
         ),
-        (MonitorConfig { data_decimation: 3, ..config }, "data_decimation must be a power of two"),
-        (MonitorConfig { frequency_decimation: 0, ..config }, "frequency_decimation must be a power of two"),
         (
-            MonitorConfig { band_hz: Some((0.0, 33.0)), data_decimation: 8, ..config },
+            MonitorConfig { evaluator: EvaluatorConfig { data_decimation: 3, ..config.evaluator }, ..config },
+            "data_decimation must be a power of two",
+        ),
+        (
+            MonitorConfig { evaluator: EvaluatorConfig { frequency_decimation: 0, ..config.evaluator }, ..config },
+            "frequency_decimation must be a power of two",
+        ),
+        (
+            MonitorConfig {
+                evaluator: EvaluatorConfig { band_hz: Some((0.0, 33.0)), data_decimation: 8, ..config.evaluator },
+                ..config
+            },
             "band_hz must be at most 32 Hz at its upper end",
         ),
-        (MonitorConfig { band_hz: Some((9.0, 3.0)), ..config }, "band_hz must be two finite frequencies"),
-        (MonitorConfig { band_hz: Some((0.01, 0.02)), ..config }, "no frequency bin is left"),
+        (
+            MonitorConfig { evaluator: EvaluatorConfig { band_hz: Some((9.0, 3.0)), ..config.evaluator }, ..config },
+            "band_hz must be two finite frequencies",
+        ),
+        (
+            MonitorConfig { evaluator: EvaluatorConfig { band_hz: Some((0.01, 0.02)), ..config.evaluator }, ..config },
+            "no frequency bin is left",
+        ),
         (
             MonitorConfig { minimum_amplitude: -1.0, ..config },
-            "minimum_amplitude must be zero or a positive amplitude, not -1",
+            "minimum_amplitude must be zero or a positive number, not -1",
         ),
-        (MonitorConfig { max_delay_s: 0.0, ..config }, "max_delay_s must be a positive duration"),
-        (MonitorConfig { expected_delay_s: Some(f64::NAN), ..config }, "expected_delay_s must be at most max_delay_s"),
         (
-            MonitorConfig { expected_delay_s: Some(-0.3), ..config },
+            MonitorConfig { evaluator: EvaluatorConfig { max_delay_s: 0.0, ..config.evaluator }, ..config },
+            "max_delay_s must be a positive duration",
+        ),
+        (
+            MonitorConfig {
+                evaluator: EvaluatorConfig { expected_delay_s: Some(f64::NAN), ..config.evaluator },
+                ..config
+            },
+            "expected_delay_s must be a finite number in seconds, not NaN",
+        ),
+        (
+            MonitorConfig { evaluator: EvaluatorConfig { expected_delay_s: Some(-0.3), ..config.evaluator }, ..config },
             "expected_delay_s must be at most max_delay_s, 0.25 s, either way, not -0.3",
         ),
         (
-            MonitorConfig { estimator: Estimator::Aligned, expected_delay_s: Some(0.3), ..config },
+            MonitorConfig {
+                evaluator: EvaluatorConfig {
+                    estimator: Estimator::Aligned,
+                    expected_delay_s: Some(0.3),
+                    ..config.evaluator
+                },
+                ..config
+            },
             "expected_delay_s must be at most max_delay_s, 0.25 s, either way, not 0.3",
         ),
-        (MonitorConfig { n_actuators: 0, ..config }, "n_actuators must be at least 1"),
+        (MonitorConfig { n_actuators: 0, ..config }, "n_actuators must be a whole number from 1 on, not 0"),
     ] {
         let message = Monitor::new(config).map(|_| ()).unwrap_err().to_string();
         assert!(message.starts_with(expected), "{message}");

@@ -6,6 +6,7 @@ use std::net::{SocketAddr, UdpSocket};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use rthstrack::{Estimator, EvaluatorConfig, MonitorConfig};
 use rthstrack_live::{Live, LiveConfig};
 use serde_json::{Value, json};
 
@@ -15,19 +16,19 @@ const HOP: usize = 16;
 
 fn main() {
     let seconds = std::env::args().skip(1).find_map(|a| a.parse::<f64>().ok()).unwrap_or(60.0);
-    for estimator in ["fei", "least_squares"] {
+    for estimator in [Estimator::Fei, Estimator::LeastSquares] {
         println!("{}", measured(estimator, seconds));
     }
 }
 
-fn measured(estimator: &str, seconds: f64) -> Value {
+fn measured(estimator: Estimator, seconds: f64) -> Value {
     let (controller, other) = (bound(), bound());
-    let monitor = json!({
-        "rate_hz": RATE_HZ, "window_s": 4.0, "update_hz": 64, "band_hz": [0, 32], "estimator": estimator,
-    });
+    let usual = MonitorConfig::default();
+    let evaluator = EvaluatorConfig { estimator, band_hz: Some((0.0, 32.0)), ..usual.evaluator };
+    let monitor = MonitorConfig { rate_hz: RATE_HZ, window_s: 4.0, update_hz: 64.0, evaluator, ..usual };
     let source = json!({"kind": "udp", "address": "127.0.0.1:0"});
     let outputs = json!({"readings_udp": at(&controller).to_string(), "log": true, "page": true});
-    let config = LiveConfig::read(&monitor, &source, &json!({}), &outputs).expect("settings");
+    let config = LiveConfig::read((monitor, Vec::new()), &source, &json!({}), &outputs).expect("settings");
     let live = Live::new(config).expect("sockets");
     live.start().expect("threads");
     let (echo, start) = (bound(), Instant::now());

@@ -368,7 +368,7 @@ impl Engine {
 
     /// How many samples a window of nothing takes until the decimator gives its first.
     fn begin_window(&mut self) {
-        let rest = (self.monitor.window_len() as u64 - 1) * self.monitor.config().data_decimation as u64;
+        let rest = (self.monitor.window_len() as u64 - 1) * self.monitor.config().evaluator.data_decimation as u64;
         self.until_evaluated = self.monitor.first_reading_len() - rest;
     }
 
@@ -410,7 +410,7 @@ impl Engine {
         }
         self.until_evaluated -= 1;
         if self.until_evaluated == 0 {
-            self.until_evaluated = self.monitor.config().data_decimation as u64;
+            self.until_evaluated = self.monitor.config().evaluator.data_decimation as u64;
             let time_s = sample.index as f64 / self.monitor.config().rate_hz - self.monitor.latency_s();
             out.evaluated(time_s, &self.monitor, &self.state);
         }

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use rthstrack::{Estimator, Monitor};
+use rthstrack::Monitor;
 
 use crate::alarm::AlarmConfig;
 use crate::board::{Board, Event};
@@ -187,9 +187,9 @@ fn hello(monitor: &Monitor, limits: &AlarmConfig, source: &str, outputs: &Output
         number(out, value);
     }
     key(out, "estimator");
-    text(out, Estimator::NAMES.iter().find(|(_, e)| *e == config.estimator).map_or("", |(name, _)| name));
+    text(out, config.evaluator.estimator.code());
     key(out, "band_hz");
-    match config.band_hz {
+    match config.evaluator.band_hz {
         Some((low, high)) => list(out, [low, high], number),
         None => out.push_str("null"),
     }

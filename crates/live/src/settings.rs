@@ -3,7 +3,7 @@
 use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
 use std::path::PathBuf;
 
-use rthstrack::{Detrend, Estimator, Monitor, MonitorConfig, Window};
+use rthstrack::{Error, Monitor, MonitorConfig};
 use serde_json::{Map, Value};
 
 use crate::alarm::AlarmConfig;
@@ -70,13 +70,18 @@ pub struct LiveConfig {
 }
 
 impl LiveConfig {
-    /// From four objects of the keys that the binding's documentation lists. What is left out has its default.
+    /// From the monitor's settings as [`rthstrack::setting::read`] has them, and three objects of the keys that the binding's
+    /// documentation lists. What is left out has its default.
     ///
     /// # Errors
     /// All mistakes, a line each.
-    pub fn read(monitor: &Value, source: &Value, alarms: &Value, outputs: &Value) -> Result<Self, Vec<String>> {
-        let mut mistakes = Vec::new();
-        let monitor = read_monitor(&mut Keys::new(&mut mistakes, "monitor", monitor));
+    pub fn read(
+        (monitor, errors): (MonitorConfig, Vec<Error>),
+        source: &Value,
+        alarms: &Value,
+        outputs: &Value,
+    ) -> Result<Self, Vec<String>> {
+        let mut mistakes: Vec<String> = errors.iter().map(|error| format!("monitor: {error}")).collect();
         let alarms = read_alarms(&mut Keys::new(&mut mistakes, "alarms", alarms), monitor.window_s);
         let outputs = read_outputs(&mut Keys::new(&mut mistakes, "outputs", outputs));
         let mut keys = Keys::new(&mut mistakes, "source", source);
@@ -226,32 +231,6 @@ fn one_of<T: Copy>(value: &Value, names: &[(&str, T)]) -> Option<T> {
     names.iter().find(|(name, _)| value.as_str() == Some(*name)).map(|(_, choice)| *choice)
 }
 
-fn pair(value: &Value) -> Option<(f64, f64)> {
-    match value.as_array()?.as_slice() {
-        [first, second] => Some((first.as_f64()?, second.as_f64()?)),
-        _ => None,
-    }
-}
-
-fn read_monitor(keys: &mut Keys<'_>) -> MonitorConfig {
-    let usual = MonitorConfig::default();
-    MonitorConfig {
-        rate_hz: keys.number("rate_hz").unwrap_or(usual.rate_hz),
-        window_s: keys.number("window_s").unwrap_or(usual.window_s),
-        update_hz: keys.number("update_hz").unwrap_or(usual.update_hz),
-        band_hz: keys.some("band_hz", "two frequencies", pair),
-        window: keys.choice("window", &Window::NAMES).unwrap_or(usual.window),
-        detrend: keys.choice("detrend", &Detrend::NAMES).unwrap_or(usual.detrend),
-        estimator: keys.choice("estimator", &Estimator::NAMES).unwrap_or(usual.estimator),
-        data_decimation: keys.size("data_decimation").unwrap_or(usual.data_decimation),
-        frequency_decimation: keys.size("frequency_decimation").unwrap_or(usual.frequency_decimation),
-        max_delay_s: keys.number("max_delay_s").unwrap_or(usual.max_delay_s),
-        expected_delay_s: keys.number("expected_delay_s"),
-        minimum_amplitude: keys.number("minimum_amplitude").unwrap_or(usual.minimum_amplitude),
-        n_actuators: keys.size("n_actuators").unwrap_or(usual.n_actuators),
-    }
-}
-
 /// An actuator may be without numbers for a window, and for so long.
 const UNJUDGED_S: f64 = 2.0;
 
@@ -349,6 +328,13 @@ fn read_senders(keys: &mut Keys<'_>, value: &Value) -> Vec<IpAddr> {
     found
 }
 
+fn pair(value: &Value) -> Option<(f64, f64)> {
+    match value.as_array()?.as_slice() {
+        [first, second] => Some((first.as_f64()?, second.as_f64()?)),
+        _ => None,
+    }
+}
+
 fn read_layout(keys: &mut Keys<'_>, n_actuators: usize) -> LayoutConfig {
     let usual = LayoutConfig::doubles(n_actuators.min(crate::layout::MAX_ACTUATORS + 1));
     // Fields of one's own have a counter of one's own, or none.
@@ -436,20 +422,25 @@ fn column(value: &Value) -> Option<Column> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rthstrack::setting;
     use serde_json::json;
 
-    fn read(monitor: Value, source: Value, alarms: Value, outputs: Value) -> Result<LiveConfig, Vec<String>> {
-        LiveConfig::read(&monitor, &source, &alarms, &outputs)
+    fn read(n_actuators: usize, source: Value, alarms: Value, outputs: Value) -> Result<LiveConfig, Vec<String>> {
+        LiveConfig::read((of_actuators(n_actuators), Vec::new()), &source, &alarms, &outputs)
+    }
+
+    fn of_actuators(n_actuators: usize) -> MonitorConfig {
+        MonitorConfig { n_actuators, ..MonitorConfig::default() }
     }
 
     #[test]
     fn what_is_left_out_has_its_default() {
-        let config = read(json!({}), json!({"kind": "udp", "address": "127.0.0.1:0"}), json!({}), json!({})).unwrap();
+        let config = read(1, json!({"kind": "udp", "address": "127.0.0.1:0"}), json!({}), json!({})).unwrap();
         assert_eq!(config.monitor, MonitorConfig::default());
         assert_eq!(config.alarms, AlarmConfig::default());
         let SourceConfig::Udp { layout, senders, .. } = config.source else { panic!() };
         assert_eq!((layout, senders), (LayoutConfig::doubles(1), None));
-        let config = read(json!({"n_actuators": 2}), json!({"kind": "lines", "layout": null}), json!(null), json!({}));
+        let config = read(2, json!({"kind": "lines", "layout": null}), json!(null), json!({}));
         let SourceConfig::Lines { layout, .. } = config.unwrap().source else { panic!() };
         assert_eq!(layout, LinesConfig::usual(2, true));
     }
@@ -465,10 +456,8 @@ mod tests {
         });
         let alarms = json!({"limit_delay_s": 0.01, "limit_lost": 5, "silence_s": null, "latch": false});
         let outputs = json!({"readings_udp": "127.0.0.1:1", "control": "127.0.0.1:0", "log": true, "page": true});
-        let config =
-            read(json!({"estimator": "least_squares", "band_hz": [0.5, 20]}), source, alarms, outputs).unwrap();
+        let config = read(1, source, alarms, outputs).unwrap();
         assert_eq!((config.fill_samples, config.check_pace), (3, false));
-        assert_eq!((config.monitor.estimator, config.monitor.band_hz), (Estimator::LeastSquares, Some((0.5, 20.0))));
         assert_eq!((config.alarms.limit_lost, config.alarms.silence_s, config.alarms.latch), (Some(5), None, false));
         let SourceConfig::Udp { layout, senders, .. } = config.source else { panic!() };
         assert_eq!((layout.counter, layout.sample_bytes, senders.unwrap().len()), (Some((0, Number::U32)), 16, 2));
@@ -481,12 +470,14 @@ mod tests {
             "kind": "udp", "address": "nowhere", "senders": ["me"], "colour": 1,
             "layout": {"byte_order": "middle", "target": [{"type": "f16"}], "measured": [{"offset": 0, "size": 4}]},
         });
-        let monitor = json!({"rate_hz": "fast", "window": "round", "n_actuators": -1});
-        let mistakes = read(monitor, source, json!({"latch": 2, "hysteresis": 7}), json!({"log": "yes"})).unwrap_err();
+        let entries = [("rate_hz", "fast"), ("window", "round"), ("colour", "red")];
+        let entries = entries.map(|(name, text)| (name.to_owned(), setting::Value::Text(text.to_owned())));
+        let (alarms, outputs) = (json!({"latch": 2, "hysteresis": 7}), json!({"log": "yes"}));
+        let mistakes = LiveConfig::read(setting::read(entries), &source, &alarms, &outputs).unwrap_err();
         for part in [
-            "monitor.rate_hz must be a number, not \"fast\"",
-            "monitor.window must be one of boxcar",
-            "monitor.n_actuators must be a whole number",
+            "monitor: rate_hz must be a positive frequency in hertz, not 'fast'",
+            "monitor: window must be one of boxcar",
+            "monitor: unknown setting colour: expected rate_hz",
             "source.address must be HOST:PORT",
             "source.senders",
             "source: unknown key 'colour'",
@@ -507,7 +498,7 @@ mod tests {
     fn a_layout_of_other_actuators_than_the_monitor_is_refused() {
         let layout = json!({"counter": null, "target": [{"offset": 0}], "measured": [{"offset": 8}]});
         let source = json!({"kind": "udp", "address": "127.0.0.1:0", "layout": layout, "fill_samples": 5000});
-        let mistakes = read(json!({"n_actuators": 2}), source, json!({}), json!({})).unwrap_err();
+        let mistakes = read(2, source, json!({}), json!({})).unwrap_err();
         assert_eq!(mistakes.len(), 2, "{mistakes:?}");
         assert!(
             mistakes[0].contains("1 actuators but n_actuators is 2")

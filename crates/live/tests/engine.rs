@@ -133,8 +133,13 @@ fn readings_are_the_cores_own() {
 
 #[test]
 fn evaluated_samples_are_told_as_the_decimator_gives_them() {
-    let config =
-        MonitorConfig { rate_hz: RATE_HZ, window_s: 1.0, update_hz: 8.0, data_decimation: 4, ..Default::default() };
+    let config = MonitorConfig {
+        rate_hz: RATE_HZ,
+        window_s: 1.0,
+        update_hz: 8.0,
+        evaluator: EvaluatorConfig { data_decimation: 4, ..MonitorConfig::default().evaluator },
+        ..Default::default()
+    };
     let monitor = Arc::new(Monitor::new(config).unwrap());
     let mut bench = Bench::with(monitor.clone(), AlarmConfig::default(), true);
     bench.run(1024);

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use rthstrack::setting;
 use rthstrack::{Monitor, MonitorConfig, MonitorState, Reading};
 use rthstrack_live::LiveConfig;
 use rthstrack_live::alarm::{Alarm, AlarmConfig, Change};
@@ -235,6 +236,30 @@ fn any_text_under_any_layout_is_a_sample_or_malformed() {
     assert!(samples > cases() / 100 && malformed > samples && unusable > 0, "{samples} {malformed} {unusable}");
 }
 
+/// A monitor's setting, of its kind or of another.
+fn entry(random: &mut Random) -> (String, setting::Value) {
+    let name = random.pick(&[
+        "rate_hz",
+        "window_s",
+        "update_hz",
+        "n_actuators",
+        "band_hz",
+        "estimator",
+        "data_decimation",
+        "x",
+    ]);
+    let value = match random.below(7) {
+        0 => setting::Value::Nothing,
+        1 => setting::Value::Flag(true),
+        2 => setting::Value::Whole(random.pick(&[-1, 0, 1, 8, 1 << 40, i64::MAX])),
+        3 => setting::Value::Number(random.pick(&[0.0, -1.0, 0.5, 1e300, 1024.0, f64::NAN, f64::INFINITY])),
+        4 => setting::Value::Pair(random.pick(&[0.0, 8.0, -1.0]), random.pick(&[f64::NAN, 1.0, 20.0])),
+        5 => setting::Value::Text(random.pick(&["fei", "aligned", "", "\n"]).to_owned()),
+        _ => setting::Value::Other("[1]".to_owned()),
+    };
+    (name.to_owned(), value)
+}
+
 fn setting(random: &mut Random, depth: usize) -> Value {
     let keys = [
         "rate_hz",
@@ -285,12 +310,14 @@ fn any_settings_are_taken_or_refused_in_words() {
     for case in 0..cases() / 10 {
         let mut random = Random::new(case ^ 0x3333);
         let mut made = || setting(&mut random, 4);
-        let [monitor, mut source, alarms, outputs] = [made(), made(), made(), made()];
+        let [mut source, alarms, outputs] = [made(), made(), made()];
+        let n_entries = random.below(4);
+        let monitor = setting::read((0..n_entries).map(|_| entry(&mut random)));
         if let (Value::Object(map), 0) = (&mut source, case % 2) {
             map.insert("kind".to_owned(), json!(if case % 4 == 0 { "udp" } else { "lines" }));
             map.insert("address".to_owned(), json!("127.0.0.1:0"));
         }
-        if let Err(mistakes) = LiveConfig::read(&monitor, &source, &alarms, &outputs) {
+        if let Err(mistakes) = LiveConfig::read(monitor, &source, &alarms, &outputs) {
             refused += 1;
             assert!(
                 !mistakes.is_empty() && mistakes.iter().all(|m| !m.contains('\n') && !m.is_empty()),

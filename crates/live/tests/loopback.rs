@@ -4,18 +4,19 @@ use std::net::UdpSocket;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use rthstrack::MonitorConfig;
 use rthstrack_live::{Live, LiveConfig, LiveError, LoggedReading};
 use serde_json::{Value, json};
 
 const PATIENCE: Duration = Duration::from_secs(20);
 
-fn opened(monitor: Value, source: Value, alarms: Value, outputs: Value) -> Result<Live, LiveError> {
-    let config = LiveConfig::read(&monitor, &source, &alarms, &outputs).map_err(LiveError::Settings)?;
+fn opened(monitor: MonitorConfig, source: Value, alarms: Value, outputs: Value) -> Result<Live, LiveError> {
+    let config = LiveConfig::read((monitor, Vec::new()), &source, &alarms, &outputs).map_err(LiveError::Settings)?;
     Live::new(config)
 }
 
-fn usual_monitor() -> Value {
-    json!({"rate_hz": 256, "window_s": 1.0, "update_hz": 32})
+fn usual_monitor() -> MonitorConfig {
+    MonitorConfig { rate_hz: 256.0, window_s: 1.0, update_hz: 32.0, ..MonitorConfig::default() }
 }
 
 fn usual_source() -> Value {

@@ -6,7 +6,8 @@ use rthstrack::{KeyFrequenciesConfig, KeyFrequenciesState, Pair};
 
 use crate::error::to_py;
 use crate::pool::Pool;
-use crate::tracking::{Numbers, Settings, numbers};
+use crate::settings::Settings;
+use crate::tracking::{Numbers, numbers};
 
 /// The bins of one target, and the plan to evaluate pairs at them.
 #[pyclass(frozen, module = "rthstrack._core")]
@@ -25,7 +26,7 @@ impl KeyFrequencies {
         share: f64,
         settings: Settings,
     ) -> PyResult<Self> {
-        let config = KeyFrequenciesConfig { share, evaluator: settings.config(py)? };
+        let config = KeyFrequenciesConfig { share, evaluator: settings.0 };
         let target = target.as_slice()?;
         let plan = py.detach(|| rthstrack::KeyFrequencies::new(target, rate_hz, config)).map_err(|e| to_py(py, &e))?;
         Ok(Self { plan, states: Pool::new() })

@@ -12,6 +12,7 @@ mod monitor;
 mod moving;
 mod pool;
 mod response;
+mod settings;
 mod signal;
 mod text;
 mod tracking;
@@ -19,6 +20,8 @@ mod tracking;
 #[pymodule]
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    m.add_function(wrap_pyfunction!(settings::settings_table, m)?)?;
+    m.add_function(wrap_pyfunction!(settings::checked_settings, m)?)?;
     m.add_class::<tracking::Evaluator>()?;
     m.add_function(wrap_pyfunction!(tracking::bridged, m)?)?;
     m.add_class::<key_frequencies::KeyFrequencies>()?;

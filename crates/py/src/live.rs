@@ -6,10 +6,12 @@ use numpy::{IntoPyArray, ndarray::Array2};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
+use rthstrack::MonitorConfig;
 use rthstrack_live::{LiveConfig, LiveError, LoggedReading};
 use serde_json::{Map, Number, Value};
 
 use crate::error::setting_error;
+use crate::settings::read_all;
 use crate::tracking::words;
 
 /// A setting of plain Python types. Numbers that JSON does not know stay in words, so that their mistake can be told.
@@ -72,9 +74,10 @@ impl Live {
         alarms: &Bound<'_, PyDict>,
         outputs: &Bound<'_, PyDict>,
     ) -> PyResult<Self> {
-        let [monitor, source, alarms, outputs] = [value(monitor)?, value(source)?, value(alarms)?, value(outputs)?];
+        let monitor = read_all::<MonitorConfig>(monitor)?;
+        let [source, alarms, outputs] = [value(source)?, value(alarms)?, value(outputs)?];
         let opened = py.detach(|| {
-            let config = LiveConfig::read(&monitor, &source, &alarms, &outputs).map_err(LiveError::Settings)?;
+            let config = LiveConfig::read(monitor, &source, &alarms, &outputs).map_err(LiveError::Settings)?;
             rthstrack_live::Live::new(config)
         });
         Ok(Self { run: opened.map_err(|error| to_py(py, error))? })

@@ -2,9 +2,10 @@
 
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use rthstrack::{CausalDecimator, Detrend, Estimator, MonitorConfig, MonitorState, Reading, Tracking, Window};
+use rthstrack::{CausalDecimator, MonitorConfig, MonitorState, Reading, Tracking};
 
-use crate::error::{choice, to_py};
+use crate::error::to_py;
+use crate::settings::Given;
 use crate::tracking::words;
 
 type Numbers<'py> = Bound<'py, PyArray1<f64>>;
@@ -19,45 +20,6 @@ type Arrays<'py> = (
     (Pairs<'py>, Pairs<'py>, Vec<String>),
 );
 
-/// `rthstrack.MonitorSettings`, read by its attributes.
-#[derive(FromPyObject)]
-struct MonitorSettings {
-    rate_hz: f64,
-    window_s: f64,
-    update_hz: f64,
-    band_hz: Option<(f64, f64)>,
-    window: String,
-    detrend: String,
-    estimator: String,
-    data_decimation: usize,
-    frequency_decimation: usize,
-    max_delay_s: f64,
-    expected_delay_s: Option<f64>,
-    minimum_amplitude: f64,
-    n_actuators: usize,
-}
-
-impl MonitorSettings {
-    /// Names become the core's own choices.
-    fn config(&self, py: Python<'_>) -> PyResult<MonitorConfig> {
-        Ok(MonitorConfig {
-            rate_hz: self.rate_hz,
-            window_s: self.window_s,
-            update_hz: self.update_hz,
-            band_hz: self.band_hz,
-            window: choice(py, "window", &Window::NAMES, &self.window)?,
-            detrend: choice(py, "detrend", &Detrend::NAMES, &self.detrend)?,
-            estimator: choice(py, "estimator", &Estimator::NAMES, &self.estimator)?,
-            data_decimation: self.data_decimation,
-            frequency_decimation: self.frequency_decimation,
-            max_delay_s: self.max_delay_s,
-            expected_delay_s: self.expected_delay_s,
-            minimum_amplitude: self.minimum_amplitude,
-            n_actuators: self.n_actuators,
-        })
-    }
-}
-
 /// The plan and the state of one stream.
 #[pyclass(module = "rthstrack._core")]
 pub(crate) struct Monitor {
@@ -68,8 +30,8 @@ pub(crate) struct Monitor {
 #[pymethods]
 impl Monitor {
     #[new]
-    fn new(py: Python<'_>, settings: MonitorSettings) -> PyResult<Self> {
-        let plan = rthstrack::Monitor::new(settings.config(py)?).map_err(|e| to_py(py, &e))?;
+    fn new(py: Python<'_>, settings: Given<MonitorConfig>) -> PyResult<Self> {
+        let plan = rthstrack::Monitor::new(settings.0).map_err(|e| to_py(py, &e))?;
         let state = plan.state();
         Ok(Self { plan, state })
     }

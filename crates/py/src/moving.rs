@@ -5,7 +5,8 @@ use pyo3::prelude::*;
 use rthstrack::{MovingConfig, Pair};
 
 use crate::error::to_py;
-use crate::tracking::{BadEntry, Settings, bad_entries, words};
+use crate::settings::Given;
+use crate::tracking::{BadEntry, bad_entries, words};
 
 type Numbers<'py> = Bound<'py, PyArray1<f64>>;
 /// (n_readings, 2)
@@ -29,18 +30,14 @@ type Arrays<'py> = (
 );
 
 #[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "they are the call's from Python")]
 pub(crate) fn evaluate_moving<'py>(
     py: Python<'py>,
     target: PyReadonlyArray1<'py, f64>,
     measured: PyReadonlyArray1<'py, f64>,
     rate_hz: f64,
-    window_s: f64,
-    hop_s: f64,
-    minimum_std_ratio: f64,
-    settings: Settings,
+    settings: Given<MovingConfig>,
 ) -> PyResult<Arrays<'py>> {
-    let config = MovingConfig { window_s, hop_s, minimum_std_ratio, evaluator: settings.config(py)? };
+    let Given(config) = settings;
     let (target, measured) = (target.as_slice()?, measured.as_slice()?);
     let moving = py
         .detach(|| Pair::new(target, measured, rate_hz).and_then(|pair| rthstrack::evaluate_moving(&pair, &config)))

@@ -3,13 +3,11 @@
 use num_complex::Complex;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
-use rthstrack::{
-    BadCount, BadFound, BadKind, BadSamples, Decimator, Detrend, Estimator, EvaluatorConfig, EvaluatorState, Noise,
-    Pair, Reason, Spectra, Tracking, Window,
-};
+use rthstrack::{BadCount, BadFound, BadKind, EvaluatorState, Pair, Reason, Spectra, Tracking};
 
-use crate::error::{choice, of_actuator, to_py};
+use crate::error::{of_actuator, to_py};
 use crate::pool::Pool;
+use crate::settings::Settings;
 use crate::signal::Columns;
 
 /// amplitude, phase_rad, delay_s, equivalent_frequency_hz, fei
@@ -58,45 +56,6 @@ pub(crate) fn words(reason: Option<&Reason>) -> String {
     reason.map_or_else(String::new, Reason::to_string)
 }
 
-/// `rthstrack.Settings`, read by its attributes.
-#[derive(FromPyObject)]
-pub(crate) struct Settings {
-    estimator: String,
-    data_decimation: usize,
-    frequency_decimation: usize,
-    decimator: String,
-    weight_power: u32,
-    window: String,
-    detrend: String,
-    band_hz: Option<(f64, f64)>,
-    max_delay_s: f64,
-    expected_delay_s: Option<f64>,
-    noise: String,
-    noise_ratio: f64,
-    bad_samples: String,
-}
-
-impl Settings {
-    /// Names become the core's own choices.
-    pub(crate) fn config(&self, py: Python<'_>) -> PyResult<EvaluatorConfig> {
-        Ok(EvaluatorConfig {
-            estimator: choice(py, "estimator", &Estimator::NAMES, &self.estimator)?,
-            data_decimation: self.data_decimation,
-            frequency_decimation: self.frequency_decimation,
-            decimator: choice(py, "decimator", &Decimator::NAMES, &self.decimator)?,
-            weight_power: self.weight_power,
-            window: choice(py, "window", &Window::NAMES, &self.window)?,
-            detrend: choice(py, "detrend", &Detrend::NAMES, &self.detrend)?,
-            band_hz: self.band_hz,
-            max_delay_s: self.max_delay_s,
-            expected_delay_s: self.expected_delay_s,
-            noise: choice(py, "noise", &Noise::NAMES, &self.noise)?,
-            noise_ratio: self.noise_ratio,
-            bad_samples: choice(py, "bad_samples", &BadSamples::NAMES, &self.bad_samples)?,
-        })
-    }
-}
-
 /// target, measured; and of each, from and to of what is bridged
 type Bridged<'py> = ([Bound<'py, PyArray1<f64>>; 2], [Vec<(usize, usize)>; 2]);
 
@@ -110,7 +69,7 @@ pub(crate) fn bridged<'py>(
     settings: Settings,
 ) -> PyResult<Option<Bridged<'py>>> {
     let pair = Pair::new(target.as_slice()?, measured.as_slice()?, rate_hz).map_err(|e| to_py(py, &e))?;
-    let found = rthstrack::bridged(&pair, &settings.config(py)?);
+    let found = rthstrack::bridged(&pair, &settings.0);
     Ok(found.map(|(signals, gaps)| {
         (signals.map(|s| s.into_pyarray(py)), gaps.map(|g| g.into_iter().map(|gap| (gap.start, gap.end)).collect()))
     }))
@@ -127,7 +86,7 @@ pub(crate) struct Evaluator {
 impl Evaluator {
     #[new]
     fn new(py: Python<'_>, n_samples: usize, rate_hz: f64, settings: Settings) -> PyResult<Self> {
-        let plan = rthstrack::Evaluator::new(n_samples, rate_hz, settings.config(py)?).map_err(|e| to_py(py, &e))?;
+        let plan = rthstrack::Evaluator::new(n_samples, rate_hz, settings.0).map_err(|e| to_py(py, &e))?;
         Ok(Self { plan, states: Pool::new() })
     }
 

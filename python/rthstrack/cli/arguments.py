@@ -5,13 +5,12 @@ from __future__ import annotations
 import argparse
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rthstrack.evaluation.presets import PRESETS
-from rthstrack.evaluation.settings import Settings
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
 ESTIMATORS = ("fei", "aligned", "least_squares")
 
@@ -37,47 +36,15 @@ def add_signals(parser: argparse.ArgumentParser, title: str) -> argparse._Argume
 
 
 def add_method(parser: argparse.ArgumentParser, *, trusted: bool = False) -> argparse._ArgumentGroup:
-    """What every evaluation settles, whatever its P and Q; `trusted`: the trusted estimate is made beside it."""
-    of_trusted = ", and so does the trusted estimate" if trusted else ""
-    method = parser.add_argument_group("evaluation")
+    """How an evaluation is made; `trusted`: the trusted estimate is made beside it."""
+    method = parser.add_argument_group(
+        "evaluation",
+        "The trusted estimate beside it takes --expected-delay and --bad-samples too." if trusted else None,
+    )
     method.add_argument("--preset", choices=tuple(PRESETS), metavar="NAME",
                         help="paper: estimator fei, Q = 16, Tukey window, mean removed, as Guo, Xu and Chen (2014) "
                         "recommend; paper-fast: P = 16 too; what is given beside it goes before it")  # fmt: skip
-    method.add_argument("--estimator", choices=ESTIMATORS, default=NOT_GIVEN, metavar="E",
-                        help="fei (default, as published), aligned or least_squares")  # fmt: skip
-    method.add_argument("--max-delay", type=positive, default=Settings().max_delay_s, metavar="S",
-                        help="largest delay or lead looked for by all estimators but fei (%(default)s s)")  # fmt: skip
-    method.add_argument("--expected-delay", type=number, metavar="S",
-                        help="of delays that fit equally well, the target being one tone, the same take the one "
-                        f"nearest to this{of_trusted}; 0: nearest to none")  # fmt: skip
-    method.add_argument("--noise", choices=("white", "coloured"), default="white", metavar="N",
-                        help="noise on measured, for least_squares: white (default) or coloured")  # fmt: skip
-    method.add_argument("--noise-ratio", type=not_negative, default=0.0, metavar="X",
-                        help="noise on target over that on measured, for least_squares (0)")  # fmt: skip
-    method.add_argument("--bad-samples", choices=("leave_out", "keep"), default="leave_out", metavar="B",
-                        help="spikes, dropouts, frozen and clipped samples, and held ones: leave_out (default) of all "
-                        f"estimators but fei{of_trusted}, or keep")  # fmt: skip
-    method.add_argument("--decimator", choices=("spectral", "chebyshev"), default="spectral", metavar="D",
-                        help="how P is done: spectral (default) or chebyshev, as published")  # fmt: skip
-    method.add_argument("--detrend", choices=("none", "mean", "linear"), default=NOT_GIVEN, metavar="D",
-                        help="none (default), mean or linear")  # fmt: skip
-    method.add_argument("--band", nargs=2, type=not_negative, metavar=("LO", "HI"), help="frequencies judged, in Hz")
     return method
-
-
-#: The default of what a preset may fix: absent, and so told from what was given.
-NOT_GIVEN = argparse.SUPPRESS
-
-
-def settle(
-    args: argparse.Namespace, usual: Mapping[str, Any], of_preset: Callable[[Settings], Mapping[str, Any]]
-) -> None:
-    """Gives what was not given the preset's value or, without one, the usual value."""
-    settings = PRESETS[args.preset] if args.preset is not None else Settings()
-    values = {"estimator": settings.estimator, "detrend": settings.detrend, **usual}
-    for name, value in (values if args.preset is None else {**values, **of_preset(settings)}).items():
-        if not hasattr(args, name):
-            setattr(args, name, value)
 
 
 def expected_delay_mistake(expected_delay_s: float | None, max_delay_s: float) -> str | None:
@@ -134,12 +101,6 @@ def factor(text: str) -> int | None:
 def tolerance(text: str) -> float:
     if not 0 < (value := number(text)) < 1:
         raise argparse.ArgumentTypeError(f"expected a number between 0 and 1, found '{text}'")
-    return value
-
-
-def weight_power(text: str) -> int:
-    if (value := count(text)) > 16:
-        raise argparse.ArgumentTypeError(f"expected a whole number from 1 to 16, found '{text}'")
     return value
 
 

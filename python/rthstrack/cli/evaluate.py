@@ -12,29 +12,18 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rthstrack.cli.arguments import (
-    NOT_GIVEN,
-    add_method,
-    add_signals,
-    expected_delay_mistake,
-    factor,
-    path,
-    positive,
-    settle,
-    tolerance,
-    weight_power,
-)
+from rthstrack.cli.arguments import add_method, add_signals, path, positive, tolerance
 from rthstrack.cli.commands import COMMANDS
+from rthstrack.cli.setting_options import FACTORS, setting_options, settle, spoken, with_auto
 from rthstrack.errors import RecordingError, RthstrackError, SettingError, SignalError
 from rthstrack.evaluation.factors import TOLERANCE
 from rthstrack.evaluation.results import json_ready
-from rthstrack.evaluation.settings import Settings
 from rthstrack.evaluation.tracking import Evaluator
 from rthstrack.recording.pairing import propose_pair
 from rthstrack.recording.reading import read_recording
 from rthstrack.recording.recording import Recording
 from rthstrack.verdict import display
-from rthstrack.verdict.assessment import Assessment, assess, without_trusted
+from rthstrack.verdict.assessment import Assessment, assess, trusted_settings, without_trusted
 from rthstrack.verdict.display import with_interval
 from rthstrack.verdict.entry import result_entry
 from rthstrack.verdict.limits import Limits
@@ -46,6 +35,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from rthstrack.evaluation.settings import Settings
     from rthstrack.evaluation.tracking import MovingTracking
 
 FAILED, EXCEEDED = 1, 3
@@ -67,17 +57,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     signals = add_signals(parser, "signals (a channel is named by name, path or #index)")
     signals.add_argument("--command", action="append", metavar="C", help="what compensation sends: judged apart")
     method = add_method(parser, trusted=True)
-    method.add_argument("-P", type=factor, default=NOT_GIVEN, metavar="N",
-                        help="data decimation, a power of two, or auto (1)")  # fmt: skip
-    method.add_argument("-Q", type=factor, default=NOT_GIVEN, metavar="N",
-                        help="frequency decimation, a power of two, or auto (1)")  # fmt: skip
+    for option in setting_options("evaluation"):
+        (with_auto(option) if option.name in FACTORS else option).add_to(method)
     method.add_argument("--tolerance", type=tolerance, metavar="X",
                         help="auto takes the largest P and Q that change amplitude and delay by at most this share, of "
                         f"the whole record ({TOLERANCE}); moving windows then keep P = Q = 1")  # fmt: skip
-    method.add_argument("--weight-power", type=weight_power, default=2, metavar="L", help="bins weigh |target|^L (2)")
-    windows = ("boxcar", "hann", "hamming", "blackman", "flattop", "tukey")
-    method.add_argument("--window", choices=windows, default=NOT_GIVEN, metavar="W",
-                        help=f"one of {', '.join(windows)} (boxcar)")  # fmt: skip
     method.add_argument("--moving", type=positive, metavar="S", help="length of a moving window (4 s)")
     method.add_argument("--hop", type=positive, metavar="S", help="from one moving window to the next")
     limits = parser.add_argument_group("limits")
@@ -96,7 +80,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
     """Evaluates the files; returns the exit status."""
-    settle(args, {"P": 1, "Q": 1, "window": "boxcar"}, _of_preset)
+    try:
+        settle(args)
+    except SettingError as impossible:
+        misuse(spoken(str(impossible)))
     _check(args, misuse)
     results, failures = _evaluate_all(args)
     assessments = [a for found in results for a in found]
@@ -177,8 +164,8 @@ def _assess(
             asked.values,
             answered.values,
             recording.rate_hz,
-            settings=_settings(args),
-            choose=tuple(name for name, given in (("P", args.P), ("Q", args.Q)) if given is None),
+            settings=args.settings,
+            choose=args.choose,
             tolerance=args.tolerance or TOLERANCE,
             moving_s=args.moving,
             hop_s=args.hop,
@@ -206,28 +193,6 @@ def _assess(
     return dataclasses.replace(assessment, warnings=tuple(said))
 
 
-def _of_preset(settings: Settings) -> dict[str, Any]:
-    return {"P": settings.data_decimation, "Q": settings.frequency_decimation, "window": settings.window}
-
-
-def _settings(args: argparse.Namespace) -> Settings:
-    return Settings(
-        estimator=args.estimator,
-        data_decimation=args.P or 1,
-        frequency_decimation=args.Q or 1,
-        decimator=args.decimator,
-        weight_power=args.weight_power,
-        window=args.window,
-        detrend=args.detrend,
-        band_hz=tuple(args.band) if args.band else None,
-        max_delay_s=args.max_delay,
-        expected_delay_s=args.expected_delay,
-        noise=args.noise,
-        noise_ratio=args.noise_ratio,
-        bad_samples=args.bad_samples,
-    )
-
-
 def _check(args: argparse.Namespace, misuse: Callable[[str], Any]) -> None:
     """What argparse cannot see: options that need or exclude each other."""
     targets, measured, commands = (args.target or []), (args.measured or []), (args.command or [])
@@ -235,25 +200,20 @@ def _check(args: argparse.Namespace, misuse: Callable[[str], Any]) -> None:
         misuse(f"--target and --measured go in pairs, found {len(targets)} and {len(measured)}")
     if commands and targets and len(commands) != len(targets):
         misuse(f"one --command for each --target is needed, found {len(commands)} for {len(targets)}")
-    chosen = args.P is None or args.Q is None
-    if args.tolerance is not None and not chosen:
+    settings: Settings = args.settings
+    if args.tolerance is not None and not args.choose:
         misuse("--tolerance speaks of P and Q that are chosen: give -P auto, -Q auto or both")
-    if chosen and args.decimator != "spectral":
-        misuse(f"-P auto and -Q auto need --decimator spectral, found {args.decimator}")
-    if chosen and args.estimator != "fei":
-        misuse(f"-P auto and -Q auto need --estimator fei, found {args.estimator}")
-    if mistake := expected_delay_mistake(args.expected_delay, args.max_delay):
-        misuse(mistake)
+    for option, needed, found in (("--decimator", "spectral", settings.decimator),
+                                  ("--estimator", "fei", settings.estimator)):  # fmt: skip
+        if args.choose and found != needed:
+            misuse(f"-P auto and -Q auto need {option} {needed}, found {found}")
     try:
         # Whether P, Q and band leave anything depends on the record; whether they go together does not.
-        few = min(args.P or 1, 2)
-        settings = without_trusted(_settings(args))
-        settings = dataclasses.replace(settings, data_decimation=few, frequency_decimation=1, band_hz=None)
-        Evaluator(1024, 1.0, settings)
+        for one in (without_trusted(settings), trusted_settings(settings, settings.expected_delay_s)):
+            few = min(one.data_decimation, 2)
+            Evaluator(1024, 1.0, one, data_decimation=few, frequency_decimation=1, band_hz=None)
     except SettingError as error:
-        misuse(str(error))
-    if args.band and args.band[0] > args.band[1]:
-        misuse(f"--band LO HI: LO must not exceed HI, found {args.band[0]:g} {args.band[1]:g}")
+        misuse(spoken(str(error)))
     if args.start is not None and args.end is not None and args.start >= args.end:
         misuse(f"--start must come before --end, found {args.start:g} and {args.end:g}")
     if args.resample and (args.rate):

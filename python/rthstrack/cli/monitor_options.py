@@ -9,18 +9,13 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rthstrack._core import settings_table
 from rthstrack.cli import addresses
-from rthstrack.cli.arguments import (
-    ESTIMATORS,
-    count,
-    expected_delay_mistake,
-    not_negative,
-    number,
-    positive,
-    power_of_two,
-)
+from rthstrack.cli.arguments import count, expected_delay_mistake, not_negative, number, positive
+from rthstrack.cli.setting_options import setting_options
 from rthstrack.errors import ConfigurationError, SettingError
 from rthstrack.evaluation.monitor import largest_decimation
+from rthstrack.evaluation.settings import MonitorSettings
 from rthstrack.live import printable
 from rthstrack.live.layout import default_layout, layout_from, read_layout
 
@@ -29,8 +24,8 @@ if TYPE_CHECKING:
 
     from rthstrack.live.layout import Layout, Source
 
-_WINDOWS = ("boxcar", "hann", "hamming", "blackman", "flattop", "tukey")
-_DETRENDS = ("none", "mean", "linear")
+# Settings whose options stand with the input's.
+_ELSEWHERE = ("rate_hz", "n_actuators")
 _PAGE_PORT = 8765
 _HIGHEST_HZ = 32.0
 # Of one evaluated sample of one actuator: history, transforms and what the estimators keep of them.
@@ -77,15 +72,6 @@ def _gathered(wrong: dict[str, str], option: str, read: Callable[[str], Any]) ->
     return convert
 
 
-def _one_of(*choices: str) -> Callable[[str], str]:
-    def read(text: str) -> str:
-        if text not in choices:
-            raise argparse.ArgumentTypeError(f"expected one of {', '.join(choices)}, found '{text}'")
-        return text
-
-    return read
-
-
 def _adder(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> Callable[..., None]:
     def add(option: str, read: Callable[[str], Any], metavar: Any, told: str, **more: Any) -> None:
         group.add_argument(option, type=_gathered(wrong, option, read), metavar=metavar, help=told, **more)
@@ -114,23 +100,12 @@ def _add_input(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> None:
 
 def _add_evaluation(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> None:
     add = _adder(group, wrong)
-    add("--window", positive, "S", "length of the window (4 s)")
-    add("--update", positive, "HZ", "readings a second, of each actuator (16)")
-    add("--band", not_negative, ("LO", "HI"), f"frequencies judged (0 to {_HIGHEST_HZ:g} Hz, or a quarter of the rate "
-        "if that is lower)", nargs=2)  # fmt: skip
-    add("--estimator", _one_of(*ESTIMATORS), "E", "least_squares (default), aligned or fei")
-    add("-P", power_of_two, "N", "data decimation, a power of two (the largest for which HI is at most rate / 4P)")
-    add("-Q", power_of_two, "N", "frequency decimation, a power of two (1)")
-    add("--window-shape", _one_of(*_WINDOWS), "W", f"one of {', '.join(_WINDOWS)} (boxcar)")
-    add("--detrend", _one_of(*_DETRENDS), "D", "none, mean (default) or linear")
-    add("--max-delay", positive, "S", "largest delay or lead looked for by all estimators but fei (0.25)")
-    add(
-        "--expected-delay",
-        number,
-        "S",
-        "of delays that fit equally well, the target being one tone, take the one nearest to this; 0: nearest to none",
-    )
-    add("--minimum-amplitude", not_negative, "X", "windows whose target moves less are not judged (0)")
+    own = {"estimator": "least_squares", "update_hz": "16 Hz", "data_decimation": "the largest for which HI is at most "
+           "rate / 4P", "band_hz": f"0 to {_HIGHEST_HZ:g} Hz, or a quarter of the rate if that is lower"}  # fmt: skip
+    for option in setting_options("monitor", flags={"window": "--window-shape"}, defaults=own):
+        if option.name not in _ELSEWHERE:
+            nargs = {"nargs": 2} if isinstance(option.metavar, tuple) else {}
+            add(option.flag, option.read, option.metavar, option.help, dest=option.name, **nargs)
 
 
 def _add_alarms(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> None:
@@ -300,12 +275,20 @@ def _named_layout(args: argparse.Namespace, mistakes: list[str]) -> Layout:
 
 
 def _monitor(args: argparse.Namespace, n_actuators: int, mistakes: list[str]) -> dict[str, Any]:
-    """The fields of the core's MonitorConfig."""
-    rate, window, update = args.rate or 1024.0, args.window or 4.0, args.update or min(16.0, args.rate or 1024.0)
-    band = (0.0, min(_HIGHEST_HZ, rate / 4)) if args.band is None or None in args.band else tuple(args.band)
-    p = args.P or largest_decimation(rate, band[1], update)
+    """The monitor's settings: what was given, and the command's own defaults."""
+    given = {row["name"]: getattr(args, row["name"], None) for row in settings_table("monitor")}
+    given |= {"rate_hz": args.rate, "n_actuators": n_actuators}
+    rate = args.rate or 1024.0
+    band = given["band_hz"]
+    band = (0.0, min(_HIGHEST_HZ, rate / 4)) if band is None or None in band else tuple(band)
+    update = given["update_hz"] or min(16.0, rate)
+    own = {"rate_hz": rate, "band_hz": band, "update_hz": update, "estimator": given["estimator"] or "least_squares",
+           "data_decimation": given["data_decimation"] or largest_decimation(rate, band[1], update)}  # fmt: skip
+    settings = dataclasses.asdict(MonitorSettings(rate))
+    settings |= {name: value for name, value in given.items() if value is not None} | own
+    p, window = settings["data_decimation"], settings["window_s"]
     if args.rate is not None:
-        mistakes += _band_mistakes(rate, band, args.P)
+        mistakes += _band_mistakes(rate, band, given["data_decimation"])
         if update > rate / p:
             mistakes.append(f"--update: expected at most the {rate / p:g} samples a second that are evaluated, "
                             f"found {update:g}")  # fmt: skip
@@ -321,24 +304,9 @@ def _monitor(args: argparse.Namespace, n_actuators: int, mistakes: list[str]) ->
                 f"--window: {window:g} s of {n_actuators} actuator(s) at {rate / p:g} evaluated samples a second need "
                 f"about {size / 2**20:.0f} MiB, expected at most {most / 2**20:.0f} MiB; take a shorter one"
             )
-    max_delay = args.max_delay or 0.25
-    if mistake := expected_delay_mistake(args.expected_delay, max_delay):
+    if mistake := expected_delay_mistake(settings["expected_delay_s"], settings["max_delay_s"]):
         mistakes.append(mistake)
-    return {
-        "rate_hz": rate,
-        "window_s": window,
-        "update_hz": update,
-        "band_hz": band,
-        "window": args.window_shape or "boxcar",
-        "detrend": args.detrend or "mean",
-        "estimator": args.estimator or "least_squares",
-        "data_decimation": p,
-        "frequency_decimation": args.Q or 1,
-        "max_delay_s": max_delay,
-        "expected_delay_s": args.expected_delay,
-        "minimum_amplitude": args.minimum_amplitude or 0.0,
-        "n_actuators": n_actuators,
-    }
+    return settings
 
 
 def _band_mistakes(rate: float, band: tuple[float, ...], p: int | None) -> Iterator[str]:

@@ -13,21 +13,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rthstrack.cli.arguments import (
-    NOT_GIVEN,
-    add_method,
-    add_signals,
-    count,
-    expected_delay_mistake,
-    number,
-    positive,
-    settle,
-    tolerance,
-)
+from rthstrack.cli.arguments import add_method, add_signals, count, number, positive, tolerance
 from rthstrack.cli.commands import COMMANDS
+from rthstrack.cli.setting_options import setting_options, spoken
 from rthstrack.errors import RthstrackError, SettingError
 from rthstrack.evaluation.factors import TOLERANCE
+from rthstrack.evaluation.presets import PRESETS
 from rthstrack.evaluation.results import json_ready
+from rthstrack.evaluation.settings import StudyMethod
 from rthstrack.studies.cells import Study
 from rthstrack.studies.grid import study
 from rthstrack.studies.pairs import Pair, read_pairs
@@ -39,10 +32,10 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from rthstrack.evaluation.settings import Settings
     from rthstrack.studies.cells import Cell
 
 FAILED = 1
+_METHOD = tuple(one.name for one in dataclasses.fields(StudyMethod))
 _DESCRIPTION = """\
 Evaluates a test over grids of data decimation P and frequency decimation Q: amplitude, delay,
 their error against the truth where it is known, their change from P = Q = 1, and the computing
@@ -86,14 +79,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     grid.add_argument(
         "-P",
         metavar="LIST",
-        default=NOT_GIVEN,
+        default=argparse.SUPPRESS,
         help=f"data decimations, powers of two (default: {powers})"
         "; auto among them adds the one that --tolerance allows",
     )
     grid.add_argument(
         "-Q",
         metavar="LIST",
-        default=NOT_GIVEN,
+        default=argparse.SUPPRESS,
         help=f"frequency decimations, powers of two (default: {powers}); auto likewise",
     )
     grid.add_argument("--combined", nargs=2, type=count, metavar=("P", "Q"),
@@ -101,7 +94,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
                       f"{COMBINED[0]} {COMBINED[1]}, or every P with every Q where -P or -Q is given)")  # fmt: skip
     grid.add_argument(
         "--windows",
-        default=NOT_GIVEN,
+        default=argparse.SUPPRESS,
         metavar="LIST",
         help=f"of boxcar, hann, hamming, blackman, flattop, tukey (default: {','.join(WINDOWS)})",
     )
@@ -121,6 +114,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     truth.add_argument("--true-amplitude", type=positive, metavar="X", help="measured over target")
     truth.add_argument("--true-delay", type=number, metavar="S", help="in seconds; positive: measured lags")
     method = add_method(parser)
+    for option in setting_options("evaluation"):
+        if option.name in _METHOD:
+            option.add_to(method)
     method.add_argument("--no-timing", action="store_true", help="measure no computing times")
     output = parser.add_argument_group("output")
     output.add_argument("-o", "--output", type=Path, metavar="DIR", help="write CSV and figures there; made if need be")
@@ -131,47 +127,41 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
     """Studies the sources; returns the exit status."""
-    settle(args, {"P": None, "Q": None, "windows": ",".join(WINDOWS)}, _of_preset)
+    _take_preset(args)
     if len(args.target or []) != len(args.measured or []):
         misuse(f"--target and --measured go in pairs, found {len(args.target or [])} and {len(args.measured or [])}")
     if args.resample and args.rate:
         misuse("--resample interpolates the file's time stamps and excludes --rate")
     if args.start is not None and args.end is not None and args.start >= args.end:
         misuse(f"--start must come before --end, found {args.start:g} and {args.end:g}")
-    if mistake := expected_delay_mistake(args.expected_delay, args.max_delay):
-        misuse(mistake)
     if args.no_figures and args.output is None:
         misuse("--no-figures speaks of what -o DIR writes: give -o DIR")
     p, q = _grid_list(args.P), _grid_list(args.Q)
     choose = tuple(name for name, given in (("P", args.P), ("Q", args.Q)) if given and "auto" in _items(given))
     if args.tolerance is not None and not choose:
         misuse("--tolerance speaks of P and Q that are chosen: give -P auto, -Q auto or both")
-    settings = StudySettings(
-        p,
-        q,
-        args.combined and tuple(args.combined),
-        _items(args.windows),
-        _weight_powers(args),
-        args.estimator,
-        args.decimator,
-        args.detrend,
-        args.band and tuple(args.band),
-        not args.no_timing,
-        choose,
-        args.tolerance or TOLERANCE,
-        () if args.share is None else _several("share", _items(args.share)),
-        args.max_delay,
-        args.expected_delay,
-        args.noise,
-        args.noise_ratio,
-        args.bad_samples,
-    ).checked()
+    method = {name: getattr(args, name) for name in _METHOD if hasattr(args, name)}
+    try:
+        settings = StudySettings(
+            **method,
+            P=p,
+            Q=q,
+            combined=args.combined and tuple(args.combined),
+            windows=_items(args.windows),
+            weight_powers=_weight_powers(args),
+            timing=not args.no_timing,
+            choose=choose,
+            tolerance=args.tolerance or TOLERANCE,
+            shares=() if args.share is None else _several("share", _items(args.share)),
+        ).checked()
+    except SettingError as impossible:
+        raise SettingError(spoken(str(impossible))) from None
     _make(args.output)
     pairs, failures = _read_all(args)
     found = None
     if pairs:
         with _progress("studying") as progress:
-            found = study(pairs, **dataclasses.asdict(settings), truth=_truth(args), progress=progress)
+            found = study(pairs, settings, truth=_truth(args), progress=progress)
     written = _write(found, args) if found is not None else []
     if args.json:
         document = {
@@ -188,10 +178,16 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
     return FAILED if failures else 0
 
 
-def _of_preset(settings: Settings) -> dict[str, str]:
-    """Its factors, beside none."""
-    p, q = ("1" if one == 1 else f"1,{one}" for one in (settings.data_decimation, settings.frequency_decimation))
-    return {"P": p, "Q": q, "windows": settings.window}
+def _take_preset(args: argparse.Namespace) -> None:
+    """What was not given is the preset's: its factors beside none."""
+    usual: dict[str, Any] = {"P": None, "Q": None, "windows": ",".join(WINDOWS)}
+    if args.preset is not None:
+        preset = PRESETS[args.preset]
+        p, q = ("1" if one == 1 else f"1,{one}" for one in (preset.data_decimation, preset.frequency_decimation))
+        usual = {name: getattr(preset, name) for name in _METHOD} | {"P": p, "Q": q, "windows": preset.window}
+    for name, value in usual.items():
+        if not hasattr(args, name):
+            setattr(args, name, value)
 
 
 def _items(text: str) -> tuple[str, ...]:
@@ -206,7 +202,7 @@ def _numbers(text: str) -> tuple[Any, ...]:
 def _weight_powers(args: argparse.Namespace) -> tuple[Any, ...]:
     if args.weight_powers is not None:
         return _numbers(args.weight_powers)
-    return (2,) if args.estimator == "least_squares" else WEIGHT_POWERS
+    return (2,) if getattr(args, "estimator", None) == "least_squares" else WEIGHT_POWERS
 
 
 def _grid_list(text: str | None) -> tuple[Any, ...] | None:

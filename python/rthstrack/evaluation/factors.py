@@ -7,21 +7,23 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 import numpy as np
 
 from rthstrack._core import KeyFrequencies as CoreKeyFrequencies
 from rthstrack._core import choose_factors as core_choose_factors
 from rthstrack._core import prior_bounds as core_prior_bounds
-from rthstrack.errors import SettingError, SignalError
-from rthstrack.evaluation.inputs import _count, _number, _samples, _single
+from rthstrack.errors import SignalError
+from rthstrack.evaluation.inputs import _count, _number, _samples, _single, merged
 from rthstrack.evaluation.results import _Result
 from rthstrack.evaluation.settings import Settings
 from rthstrack.evaluation.tracking import Tracking, _plan
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
+
+    from rthstrack.evaluation.settings import EvaluationKeywords, OtherKeywords
 
 #: Largest relative change of amplitude and delay, unless told otherwise.
 TOLERANCE = 0.005
@@ -129,7 +131,8 @@ def choose_factors(
     tolerance: float = TOLERANCE,
     data_decimation: int | None = None,
     frequency_decimation: int | None = None,
-    **settings: Any,
+    settings: Settings | None = None,
+    **changes: Unpack[OtherKeywords],
 ) -> Factors:
     """The largest P and Q that change amplitude and delay by no more than a tolerance, and the bound they keep to.
 
@@ -147,7 +150,7 @@ def choose_factors(
 
     target, measured: (n_samples,), any one unit; rate_hz: samples a second. tolerance: above 0, below 1.
     data_decimation, frequency_decimation: one of them given stays, and changes are counted from it with the other at 1.
-    settings: the others of `evaluate`; the decimator must be "spectral". Raises SignalError, SettingError.
+    settings, or keywords: the others of `evaluate`; the decimator must be "spectral". Raises SignalError, SettingError.
 
     >>> import numpy as np
     >>> t = np.arange(8192) / 1024
@@ -159,11 +162,11 @@ def choose_factors(
     t, m = _single(target, measured)
     p = None if data_decimation is None else _count("data_decimation", data_decimation)
     q = None if frequency_decimation is None else _count("frequency_decimation", frequency_decimation)
-    base = _settings(settings)
+    base = _without_factors(settings, changes)
     plan = _plan(len(t), rate := _number("rate_hz", rate_hz), base)
     allowed = _number("tolerance", tolerance)
     reference = dataclasses.replace(base, data_decimation=p or 1, frequency_decimation=q or 1)
-    chosen_p, chosen_q, amplitude_bound, delay_bound, measure, numbers, changes = _choice(
+    chosen_p, chosen_q, amplitude_bound, delay_bound, measure, numbers, changed = _choice(
         core_choose_factors(plan, t, m, allowed, p, q)
     )
     found = Factors(
@@ -176,13 +179,13 @@ def choose_factors(
         dataclasses.replace(base, data_decimation=chosen_p, frequency_decimation=chosen_q),
         _tracking(
             numbers,
-            int(changes.n_bins[0]),
+            int(changed.n_bins[0]),
             plan.delta_f_hz * reference.frequency_decimation,
             rate,
             len(t),
             reference,
         ),
-        changes,
+        changed,
     )
     if q is None and _may_grow(found):
         return dataclasses.replace(found, windowed=_windowed(t, m, rate, found, base, p))
@@ -240,7 +243,11 @@ def _tracking(numbers: Any, *about: Any) -> Tracking:
 
 
 def prior_bounds(
-    target: ArrayLike, measured: ArrayLike, rate_hz: float, **settings: Any
+    target: ArrayLike,
+    measured: ArrayLike,
+    rate_hz: float,
+    settings: Settings | None = None,
+    **changes: Unpack[OtherKeywords],
 ) -> tuple[FactorChanges, FactorChanges]:
     """What could be said of P alone and of Q alone without the bins: safe, but shy; to compare `choose_factors` with.
 
@@ -252,7 +259,7 @@ def prior_bounds(
     Arguments and errors as in `choose_factors`; returns the bounds over P and over Q, the other factor at 1.
     """
     t, m = _single(target, measured)
-    plan = _plan(len(t), _number("rate_hz", rate_hz), _settings(settings))
+    plan = _plan(len(t), _number("rate_hz", rate_hz), _without_factors(settings, changes))
     over_p, over_q, near_zero = core_prior_bounds(plan, t, m)
     measure: Literal["relative", "phase"] = "phase" if near_zero else "relative"
     return FactorChanges(*over_p, measure), FactorChanges(*over_q, measure)
@@ -299,11 +306,17 @@ class KeyFrequencies(_Result):
         return {"frequency_hz": self.frequency_hz}
 
 
-def key_frequencies(target: ArrayLike, rate_hz: float, share: float = SHARE, **settings: Any) -> KeyFrequencies:
+def key_frequencies(
+    target: ArrayLike,
+    rate_hz: float,
+    share: float = SHARE,
+    settings: Settings | None = None,
+    **changes: Unpack[EvaluationKeywords],
+) -> KeyFrequencies:
     """The fewest bins that together hold at least `share` of sum |I|^l, heaviest first (the paper's third wish).
 
     target: (n_samples,), a whole record or a first window; pairs of the same length are then evaluated at these bins
-    alone. share: above 0, at most 1. settings: those of `evaluate`; the decimator must be "spectral".
+    alone. share: above 0, at most 1. settings, or keywords: those of `evaluate`; the decimator must be "spectral".
     What they cost beside a plain evaluation is in docs/accuracy.md.
 
     Raises SignalError, SettingError.
@@ -318,7 +331,7 @@ def key_frequencies(target: ArrayLike, rate_hz: float, share: float = SHARE, **s
     t = _samples("target", target)
     if t.ndim != 1:
         raise SignalError(f"one actuator at a time is taken here: pass one column, not an array of shape {t.shape}")
-    checked = _settings(settings, factors=True)
+    checked = merged(Settings, settings, changes)
     rate, wanted = _number("rate_hz", rate_hz), _number("share", share)
     plan = CoreKeyFrequencies(t, rate, wanted, checked)
     return KeyFrequencies(
@@ -326,10 +339,7 @@ def key_frequencies(target: ArrayLike, rate_hz: float, share: float = SHARE, **s
     )
 
 
-def _settings(settings: dict[str, Any], *, factors: bool = False) -> Settings:
-    """The settings, checked; P and Q among them only where `factors` are a setting."""
-    known = [f.name for f in dataclasses.fields(Settings) if factors or not f.name.endswith("_decimation")]
-    unknown = [name for name in settings if name not in known]
-    if unknown:
-        raise SettingError(f"unknown setting {', '.join(unknown)}: expected {', '.join(known)}")
-    return Settings(**settings)._checked()
+def _without_factors(settings: Settings | None, changes: OtherKeywords) -> Settings:
+    """Settings with changes at P = Q = 1: the factors are arguments of their own."""
+    whole = merged(Settings, settings, changes)
+    return dataclasses.replace(whole, data_decimation=1, frequency_decimation=1)

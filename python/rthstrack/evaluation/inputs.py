@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import operator
-from typing import TYPE_CHECKING, Any
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from rthstrack.errors import SettingError, SignalError
+from rthstrack.evaluation.settings import Settings
+from rthstrack.keyed_table import suggestion
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from _typeshed import DataclassInstance
     from numpy.typing import ArrayLike, NDArray
 
 
@@ -21,6 +27,27 @@ def _band(band_hz: Any) -> tuple[float, float] | None:
         return float(low), float(high)
     except (TypeError, ValueError):
         raise SettingError(f"band_hz must be two frequencies (low, high) in Hz, not {band_hz!r}") from None
+
+
+_Kind = TypeVar("_Kind", bound="DataclassInstance")
+
+
+def merged(kind: type[_Kind], settings: DataclassInstance | None, changes: Mapping[str, Any]) -> _Kind:
+    """Settings with changes, which go before them; raises SettingError for a name that there is not."""
+    if not changes and isinstance(settings, kind):
+        return settings
+    given = {} if settings is None else {one.name: getattr(settings, one.name) for one in fields(settings)}
+    given |= changes
+    known = [one.name for one in fields(kind)]
+    if unknown := [name for name in given if name not in known]:
+        near = suggestion(unknown[0], known) or f"; there are: {', '.join(known)}"
+        raise SettingError(f"unknown setting {', '.join(unknown)}{near}")
+    return kind(**given)
+
+
+def of_each(settings: Settings) -> Settings:
+    """How each of the windows is evaluated."""
+    return Settings(**{one.name: getattr(settings, one.name) for one in fields(Settings)})
 
 
 def _count(name: str, value: Any) -> int:

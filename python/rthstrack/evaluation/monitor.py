@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
 from rthstrack._core import Monitor as CoreMonitor
 from rthstrack._core import causal_decimate as core_causal_decimate
 from rthstrack.errors import SettingError, SignalError
-from rthstrack.evaluation.inputs import _band, _count, _number, _samples
+from rthstrack.evaluation.inputs import _count, _samples, merged
 from rthstrack.evaluation.results import _ends, _Result
 from rthstrack.evaluation.settings import MonitorSettings
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
+
+    from rthstrack.evaluation.settings import MonitorKeywords
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,13 +77,11 @@ class Monitor:
     ends with them), computed anew: nothing drifts, and a sample that is NaN or infinite spoils just the windows that
     hold it.
 
-    rate_hz: samples a second. window_s: length of the window. update_hz: readings a second (rounded to a whole number
-    of decimated samples). band_hz, window, detrend, estimator, frequency_decimation, max_delay_s: as in `evaluate`.
-    data_decimation: P, a power of two: samples are low-passed and decimated as they come, which keeps up to
-    rate / (4 P); None chooses the largest for the band. With P above 1 "least_squares" leaves a band from 0 to
-    just that to the low-pass, as if `band_hz` were None. expected_delay_s: of delays that fit equally well (the target
-    is one tone) the one nearest to this is taken. minimum_amplitude: windows in which the target's amplitude (sqrt(2)
-    times its standard deviation) is less are not judged. n_actuators: channels that are stepped together.
+    rate_hz: samples a second, or `MonitorSettings` whole. window_s: length of the window. update_hz: readings a second
+    (rounded to a whole number of decimated samples). Other settings by the names of `MonitorSettings`, in
+    docs/settings.md. data_decimation: samples are low-passed and decimated as they come, which keeps up to
+    rate / (4 P); None chooses the largest for the band. With P above 1 "least_squares" leaves a band from 0 to just
+    that to the low-pass, as if `band_hz` were None.
 
     A monitor has a state and belongs to one thread. Raises SettingError.
 
@@ -100,41 +100,23 @@ class Monitor:
 
     def __init__(
         self,
-        rate_hz: float,
-        window_s: float = 4.0,
-        update_hz: float = 64.0,
-        *,
-        band_hz: tuple[float, float] | None = None,
-        window: str = "boxcar",
-        detrend: str = "mean",
-        estimator: str = "fei",
-        data_decimation: int | None = 1,
-        frequency_decimation: int = 1,
-        max_delay_s: float = 0.25,
-        expected_delay_s: float | None = None,
-        minimum_amplitude: float = 0.0,
-        n_actuators: int = 1,
+        rate_hz: float | MonitorSettings,
+        window_s: float | None = None,
+        update_hz: float | None = None,
+        **changes: Unpack[MonitorKeywords],
     ) -> None:
-        rate_hz, band = _number("rate_hz", rate_hz), _band(band_hz)
-        if data_decimation is None:
-            data_decimation = (
-                largest_decimation(rate_hz, band[1], _number("update_hz", update_hz)) if band and band[1] > 0 else 1
-            )
-        self.settings = MonitorSettings(
-            rate_hz,
-            _number("window_s", window_s),
-            _number("update_hz", update_hz),
-            band,
-            str(window),
-            str(detrend),
-            str(estimator),
-            _count("data_decimation", data_decimation),
-            _count("frequency_decimation", frequency_decimation),
-            _number("max_delay_s", max_delay_s),
-            None if expected_delay_s is None else _number("expected_delay_s", expected_delay_s),
-            _number("minimum_amplitude", minimum_amplitude),
-            _count("n_actuators", n_actuators),
-        )
+        given: dict[str, Any] = dict(changes)
+        settings = rate_hz if isinstance(rate_hz, MonitorSettings) else None
+        given |= {} if settings else {"rate_hz": rate_hz}
+        given |= {} if window_s is None else {"window_s": window_s}
+        given |= {} if update_hz is None else {"update_hz": update_hz}
+        is_chosen = "data_decimation" in given and given["data_decimation"] is None
+        if is_chosen:
+            given["data_decimation"] = 1
+        self.settings = merged(MonitorSettings, settings, given)
+        if is_chosen and (band_hz := self.settings.band_hz) is not None and band_hz[1] > 0:
+            factor = largest_decimation(self.settings.rate_hz, band_hz[1], self.settings.update_hz)
+            self.settings = dataclasses.replace(self.settings, data_decimation=factor)
         self._stream = CoreMonitor(self.settings)
 
     @property

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Unpack
 
 from rthstrack.errors import SettingError
+from rthstrack.evaluation.inputs import merged
 from rthstrack.evaluation.settings import Settings
 from rthstrack.keyed_table import suggestion
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from rthstrack.evaluation.settings import EvaluationKeywords
 
 _PAPER = Settings(estimator="fei", frequency_decimation=16, window="tukey", detrend="mean")
 
@@ -20,7 +23,7 @@ _PAPER = Settings(estimator="fei", frequency_decimation=16, window="tukey", detr
 PRESETS: Mapping[str, Settings] = MappingProxyType({"paper": _PAPER, "paper-fast": replace(_PAPER, data_decimation=16)})
 
 
-def preset(name: str, **changes: Any) -> Settings:
+def preset(name: str, **changes: Unpack[EvaluationKeywords]) -> Settings:
     """The settings of this name, with changes: `assess(..., settings=preset("paper", band_hz=(0.5, 20.0)))`.
 
     Raises SettingError for an unknown name or setting, with those that there are.
@@ -29,9 +32,4 @@ def preset(name: str, **changes: Any) -> Settings:
         raise SettingError(
             f"preset: expected one of {', '.join(PRESETS)}, found {name!r}{suggestion(str(name), PRESETS)}"
         )
-    known = [one.name for one in fields(Settings)]
-    for setting in changes:
-        if setting not in known:
-            near = suggestion(setting, known) or f"; there are: {', '.join(known)}"
-            raise SettingError(f"preset: no such setting: {setting}{near}")
-    return replace(PRESETS[name], **changes)
+    return merged(Settings, PRESETS[name], changes)

@@ -11,18 +11,18 @@ import math
 import threading
 from collections import OrderedDict
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, Unpack
 
 import numpy as np
 
 from rthstrack._core import Evaluator as CoreEvaluator
 from rthstrack._core import bridged as core_bridged
 from rthstrack._core import evaluate_moving as core_evaluate_moving
-from rthstrack.errors import RthstrackError, SettingError, SignalError
+from rthstrack.errors import RthstrackError, SignalError
 from rthstrack.evaluation.bad_samples import _bad_samples, bad_words
-from rthstrack.evaluation.inputs import _count, _number, _pair
+from rthstrack.evaluation.inputs import _count, _number, _pair, merged, of_each
 from rthstrack.evaluation.results import _INTERVALS, _SPREADS, _ends, _Result
-from rthstrack.evaluation.settings import Settings
+from rthstrack.evaluation.settings import MovingSettings, Settings
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from rthstrack.evaluation.bad_samples import BadSamples
+    from rthstrack.evaluation.settings import EvaluationKeywords, MovingKeywords
 
 _T = TypeVar("_T")
 
@@ -167,13 +168,14 @@ class Evaluator:
 
     __slots__ = ("_plan", "n_samples", "rate_hz", "settings")
 
-    def __init__(self, n_samples: int, rate_hz: float, settings: Settings | None = None, **changes: Any) -> None:
-        try:
-            self.settings = dataclasses.replace(settings or Settings(), **changes)._checked()
-        except TypeError:
-            known = [f.name for f in dataclasses.fields(Settings)]
-            unknown = [name for name in changes if name not in known]
-            raise SettingError(f"unknown setting {', '.join(unknown)}: expected {', '.join(known)}") from None
+    def __init__(
+        self,
+        n_samples: int,
+        rate_hz: float,
+        settings: Settings | None = None,
+        **changes: Unpack[EvaluationKeywords],
+    ) -> None:
+        self.settings = merged(Settings, settings, changes)
         self.n_samples = _count("n_samples", n_samples)
         self.rate_hz = _number("rate_hz", rate_hz)
         self._plan = _plan(self.n_samples, self.rate_hz, self.settings)
@@ -200,21 +202,10 @@ def evaluate(
     target: ArrayLike,
     measured: ArrayLike,
     rate_hz: float,
+    settings: Settings | None = None,
     *,
-    estimator: str = "fei",
-    data_decimation: int = 1,
-    frequency_decimation: int = 1,
-    decimator: str = "spectral",
-    weight_power: int = 2,
-    window: str = "boxcar",
-    detrend: str = "none",
-    band_hz: tuple[float, float] | None = None,
-    max_delay_s: float = 0.25,
-    expected_delay_s: float | None = None,
-    noise: str = "white",
-    noise_ratio: float = 0.0,
-    bad_samples: str = "leave_out",
     weights: bool = False,
+    **changes: Unpack[EvaluationKeywords],
 ) -> Tracking:
     """Amplitude and delay of measured over target for whole records (Guo, Xu and Chen 2014, Eqs 1-12; or by alignment).
 
@@ -228,19 +219,11 @@ def evaluate(
     ends for which I(t - d) is not known are left out.
 
     target, measured: (n_samples,) or (n_samples, n_actuators), any one unit; rate_hz: samples a second.
-    data_decimation: P, a power of two: keeps frequencies up to rate/(2P); decimator "spectral" keeps exactly the
-    bins of the undecimated transform, "chebyshev" filters and resamples as the paper did.
-    frequency_decimation: Q, a power of two: keeps every Q-th bin.
-    weight_power: l, 1 to 16. window: boxcar, hann, hamming, blackman, flattop or tukey (alpha 0.5).
-    detrend: none, mean or linear. band_hz: lowest and highest frequency kept, both included.
-    max_delay_s: "aligned" and "least_squares" look for delays and leads up to this, and a quarter of the record.
-    expected_delay_s: of delays that fit them equally well (turns of a motion that is one tone, or nearly) the one
-    nearest to this; None says "ambiguous".
-    noise, noise_ratio: of "least_squares" only. noise "coloured": both signals are whitened by an autoregression of
-    what a first fit leaves, and fitted again. noise_ratio: standard deviation of the noise on target over that on
-    measured; above 0, total least squares over the bins in which both stand clear of white noise.
-    bad_samples: "leave_out" (spikes, dropouts, frozen and clipped stretches have no part in the fit of "aligned" and
-    "least_squares", and of held samples the fresh ones are judged) or "keep"; what was found is `bad_samples`.
+    settings, or keywords of the same names: `Settings`, listed in docs/settings.md; keywords go before settings.
+    noise "coloured": both signals are whitened by an autoregression of what a first fit leaves, and fitted again;
+    noise_ratio above 0: total least squares over the bins in which both stand clear of white noise.
+    bad_samples "leave_out": spikes, dropouts, frozen and clipped stretches have no part in the fit, and of held samples
+    the fresh ones are judged; what was found is `bad_samples` of the result.
     weights: also return the kept bins with their weights and spectra.
 
     delay_s > 0: measured lags. Raises SignalError for samples that cannot be judged, SettingError for settings.
@@ -254,21 +237,7 @@ def evaluate(
     0.980, lags by 12.00 ms
     """
     t, m = _pair(target, measured)
-    settings = Settings(
-        estimator,
-        data_decimation,
-        frequency_decimation,
-        decimator,
-        weight_power,
-        window,
-        detrend,
-        band_hz,
-        max_delay_s,
-        expected_delay_s,
-        noise,
-        noise_ratio,
-        bad_samples,
-    )._checked()
+    settings = merged(Settings, settings, changes)
     rate_hz = _number("rate_hz", rate_hz)
     return _tracking(_plan(len(t), rate_hz, settings), settings, rate_hz, t, m, weights)
 
@@ -329,23 +298,8 @@ def evaluate_moving(
     target: ArrayLike,
     measured: ArrayLike,
     rate_hz: float,
-    *,
-    window_s: float = 4.0,
-    hop_s: float = 0.25,
-    minimum_std_ratio: float = 0.05,
-    estimator: str = "fei",
-    data_decimation: int = 1,
-    frequency_decimation: int = 1,
-    decimator: str = "spectral",
-    weight_power: int = 2,
-    window: str = "boxcar",
-    detrend: str = "none",
-    band_hz: tuple[float, float] | None = None,
-    max_delay_s: float = 0.25,
-    expected_delay_s: float | None = None,
-    noise: str = "white",
-    noise_ratio: float = 0.0,
-    bad_samples: str = "leave_out",
+    settings: Settings | None = None,
+    **changes: Unpack[MovingKeywords],
 ) -> MovingTracking:
     """A(t), d(t) and f_eq(t): `evaluate` on windows of window_s, one every hop_s.
 
@@ -356,27 +310,13 @@ def evaluate_moving(
     Where the target's standard deviation in the window is below minimum_std_ratio times that of the whole record, or
     nothing is left to judge by, `valid` is False and the numbers are NaN.
 
+    settings, or keywords: those of `evaluate`, and of `MovingSettings`, in docs/settings.md.
+
     Other arguments, shapes, signs and errors as in `evaluate`; SettingError for a window longer than the record.
     """
     t, m = _pair(target, measured)
-    settings = Settings(
-        estimator,
-        data_decimation,
-        frequency_decimation,
-        decimator,
-        weight_power,
-        window,
-        detrend,
-        band_hz,
-        max_delay_s,
-        expected_delay_s,
-        noise,
-        noise_ratio,
-        bad_samples,
-    )._checked()
-    rate_hz, window_s, hop_s = _number("rate_hz", rate_hz), _number("window_s", window_s), _number("hop_s", hop_s)
-    ratio = _number("minimum_std_ratio", minimum_std_ratio)
-    found = _each_actuator(t, m, lambda x, y: core_evaluate_moving(x, y, rate_hz, window_s, hop_s, ratio, settings))
+    whole, rate_hz = merged(MovingSettings, settings, changes), _number("rate_hz", rate_hz)
+    found = _each_actuator(t, m, lambda x, y: core_evaluate_moving(x, y, rate_hz, whole))
     time_s = found[0][0][0]
     averaged: Any
     reasons: Any
@@ -391,7 +331,8 @@ def evaluate_moving(
         bad = tuple(_bad_samples(entries, rate_hz) for entries in each_bad)
         precision = [np.stack(column, axis=1) for column in found_precision]
         reasons = tuple(tuple(r) for r in each)
-    columns = (time_s, *averaged, window_s, hop_s, ratio, rate_hz, settings, *precision, bad, reasons)
+    windows = (whole.window_s, whole.hop_s, whole.minimum_std_ratio)
+    columns = (time_s, *averaged, *windows, rate_hz, of_each(whole), *precision, bad, reasons)
     return MovingTracking(*columns)
 
 

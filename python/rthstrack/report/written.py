@@ -9,26 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rthstrack._core import settings_table
 from rthstrack.report.record import NOT_DETERMINED
 from rthstrack.verdict import display
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-_SETTING_NAMES = {
-    "estimator": "Estimator",
-    "data_decimation": "Data decimation P",
-    "frequency_decimation": "Frequency decimation Q",
-    "decimator": "Decimator",
-    "weight_power": "Weight power l",
-    "window": "Window",
-    "detrend": "Detrend",
-    "band_hz": "Band",
-    "max_delay_s": "Largest delay looked for",
-    "expected_delay_s": "Expected delay",
-    "noise": "Noise on measured",
-    "noise_ratio": "Noise on target over that on measured",
-    "bad_samples": "Bad samples",
+#: Settings by the core's labels, and what else the page lists.
+_SETTING_NAMES = {row["name"]: row["label"] for row in settings_table("evaluation")} | {
     "moving_s": "Moving windows",
     "hop_s": "One moving window every",
     "rate_source": "Rate from",

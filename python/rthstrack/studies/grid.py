@@ -12,20 +12,22 @@ import math
 import os
 import time
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from rthstrack.errors import SettingError, SignalError
-from rthstrack.evaluation.factors import TOLERANCE, choose_factors, key_frequencies
-from rthstrack.evaluation.settings import Settings
+from rthstrack.evaluation.factors import choose_factors, key_frequencies
+from rthstrack.evaluation.inputs import merged
 from rthstrack.evaluation.tracking import Evaluator, Tracking
 from rthstrack.studies.cells import Cell, StudiedSource, Study, _key
 from rthstrack.studies.pairs import _pairs
-from rthstrack.studies.settings import WEIGHT_POWERS, WINDOWS, StudySettings
+from rthstrack.studies.settings import StudySettings
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
+    from rthstrack.evaluation.settings import Settings
     from rthstrack.studies.pairs import Pair, Source, Truth
+    from rthstrack.studies.settings import StudyKeywords
 
 # The best of so many calls, fewer where they take long in all.
 _MOST_CALLS, _LEAST_CALLS, _ENOUGH_S = 20, 3, 0.05
@@ -33,27 +35,11 @@ _MOST_CALLS, _LEAST_CALLS, _ENOUGH_S = 20, 3, 0.05
 
 def study(
     sources: Source | Sequence[Source] | Mapping[str, Source],
+    settings: StudySettings | None = None,
     *,
-    P: Iterable[int] | None = None,
-    Q: Iterable[int] | None = None,
-    combined: tuple[int, int] | None = None,
-    windows: Iterable[str] = WINDOWS,
-    weight_powers: Iterable[int] = WEIGHT_POWERS,
-    estimator: str = "fei",
-    decimator: str = "spectral",
-    detrend: str = "none",
-    band_hz: tuple[float, float] | None = None,
     truth: Truth | None = None,
-    timing: bool = True,
-    choose: Iterable[str] = (),
-    tolerance: float = TOLERANCE,
-    shares: Iterable[float] = (),
-    max_delay_s: float = Settings().max_delay_s,
-    expected_delay_s: float | None = None,
-    noise: str = "white",
-    noise_ratio: float = 0.0,
-    bad_samples: str = "leave_out",
     progress: Callable[[int, int], object] | None = None,
+    **changes: Unpack[StudyKeywords],
 ) -> Study:
     """Amplitude, delay, their change and error, and computing time over grids of P and Q, windows and weight powers.
 
@@ -64,31 +50,12 @@ def study(
     truth: as in `Pair`, in place of what the sources say themselves (a `Run` knows its own).
     choose: "P", "Q" or both: also the largest factors within `tolerance` (`choose_factors`); one alone: the other at 1.
     shares: also the key frequencies that hold these shares of the weight, by `key_frequencies`.
-    Other settings as in `evaluate`.
+    Other settings as in `evaluate`; `StudySettings` in place of keywords.
     timing: also time every cell, one after another when all numbers are there. progress: called with (done, total).
 
     A cell that leaves nothing to judge by is NaN, with a reason. Raises SettingError, SignalError, RecordingError.
     """
-    settings = StudySettings(
-        P,  # type: ignore[arg-type]
-        Q,  # type: ignore[arg-type]
-        combined,
-        windows,  # type: ignore[arg-type]
-        weight_powers,  # type: ignore[arg-type]
-        estimator,
-        decimator,
-        detrend,
-        band_hz,
-        timing,
-        choose,  # type: ignore[arg-type]
-        tolerance,
-        shares,  # type: ignore[arg-type]
-        max_delay_s,
-        expected_delay_s,
-        noise,
-        noise_ratio,
-        bad_samples,
-    ).checked()
+    settings = merged(StudySettings, settings, changes).checked()
     pairs = _pairs(sources, truth)
     grid, kinds = settings._grid(), settings._kinds()
     extras = [("chosen", math.nan)] * bool(settings.choose) + [("key", share) for share in settings.shares]
@@ -97,7 +64,7 @@ def study(
     wanted = {_key(pair.name, one): (pair, one) for one in each for pair in pairs}
     beside = [(pair, kind, *extra) for kind in kinds for extra in extras for pair in pairs]
     n_cells = len(pairs) * len(kinds) * (len(grid) + len(extras))
-    steps = _Steps(progress, len(wanted) + len(beside) + timing * n_cells)
+    steps = _Steps(progress, len(wanted) + len(beside) + settings.timing * n_cells)
     with ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
         found = {}
         for key, result in zip(wanted, pool.map(lambda one: _evaluated(*one), wanted.values()), strict=True):
@@ -121,7 +88,7 @@ def study(
             for at in (_at(kind, p, q) for p, q in grid):
                 cells.append(_cell(pair, at, found[_key(pair.name, at)], reference))
             cells += [others[pair.name, kind, *extra] for extra in extras]
-    if timing:
+    if settings.timing:
         per_pair = n_cells // len(pairs)
         for i in sorted(range(n_cells), key=lambda i: i % per_pair):
             if not cells[i].reason:
@@ -190,13 +157,12 @@ def _chosen_cell(
     pair: Pair, kind: Settings, choose: tuple[str, ...], tolerance: float, reference: Tracking | str
 ) -> Cell:
     """The cell of the factors that `choose_factors` takes, with its bounds."""
-    rest = _without_factors(kind)
     given: dict[str, Any] = {
         "data_decimation": None if "P" in choose else 1,
         "frequency_decimation": None if "Q" in choose else 1,
     }
     try:
-        factors = choose_factors(pair.target, pair.measured, pair.rate_hz, tolerance=tolerance, **given, **rest)
+        factors = choose_factors(pair.target, pair.measured, pair.rate_hz, tolerance=tolerance, settings=kind, **given)
     except (SettingError, SignalError) as error:
         return dataclasses.replace(_cell(pair, kind, str(error), reference), kind="chosen", tolerance=tolerance)
     return dataclasses.replace(
@@ -212,17 +178,11 @@ def _chosen_cell(
 def _key_cell(pair: Pair, kind: Settings, share: float, reference: Tracking | str) -> Cell:
     """The cell of the key frequencies of this pair's own target."""
     try:
-        key = key_frequencies(pair.target, pair.rate_hz, share, **_without_factors(kind))
+        key = key_frequencies(pair.target, pair.rate_hz, share, kind)
         cell = _cell(pair, kind, key.evaluate(pair.target, pair.measured), reference)
     except (SettingError, SignalError) as error:
         return dataclasses.replace(_cell(pair, kind, str(error), reference), kind="key", share=share)
     return dataclasses.replace(cell, kind="key", share=share, highest_frequency_hz=float(key.frequency_hz[-1]))
-
-
-def _without_factors(settings: Settings) -> dict[str, Any]:
-    rest = dataclasses.asdict(settings)
-    del rest["data_decimation"], rest["frequency_decimation"]
-    return rest
 
 
 def _at(kind: Settings, p: int, q: int) -> Settings:
@@ -236,7 +196,7 @@ def _relative(value: float, reference: float) -> float:
 def _computing_time_s(pair: Pair, cell: Cell) -> float:
     """The fastest of several calls: whatever else the machine does can only slow a call down."""
     if cell.kind == "key":
-        plan: Any = key_frequencies(pair.target, pair.rate_hz, cell.share, **_without_factors(cell.settings))
+        plan: Any = key_frequencies(pair.target, pair.rate_hz, cell.share, cell.settings)
     else:
         plan = Evaluator(pair.target.size, pair.rate_hz, cell.settings)
     best, spent, calls = math.inf, 0.0, 0

@@ -12,7 +12,7 @@ import numpy as np
 from rthstrack.errors import SettingError
 from rthstrack.evaluation.factors import TOLERANCE
 from rthstrack.evaluation.inputs import _count, _number
-from rthstrack.evaluation.settings import Settings
+from rthstrack.evaluation.settings import Settings, StudyMethod, StudyMethodKeywords
 from rthstrack.evaluation.tracking import Evaluator
 
 if TYPE_CHECKING:
@@ -26,8 +26,25 @@ WINDOWS = ("boxcar", "hann")
 WEIGHT_POWERS = (2,)
 
 
+_METHOD = tuple(one.name for one in dataclasses.fields(StudyMethod))
+
+
+class StudyKeywords(StudyMethodKeywords, total=False):
+    """Settings of a study by name."""
+
+    P: Iterable[int] | None
+    Q: Iterable[int] | None
+    combined: tuple[int, int] | None
+    windows: Iterable[str]
+    weight_powers: Iterable[int]
+    timing: bool
+    choose: Iterable[str]
+    tolerance: float
+    shares: Iterable[float]
+
+
 @dataclass(frozen=True, slots=True)
-class StudySettings:
+class StudySettings(StudyMethod):
     """What a study goes over; the words and defaults are those of `study`."""
 
     P: tuple[int, ...] | None = None
@@ -35,28 +52,18 @@ class StudySettings:
     combined: tuple[int, int] | None = None
     windows: tuple[str, ...] = WINDOWS
     weight_powers: tuple[int, ...] = WEIGHT_POWERS
-    estimator: str = "fei"
-    decimator: str = "spectral"
-    detrend: str = "none"
-    band_hz: tuple[float, float] | None = None
     timing: bool = True
     choose: tuple[str, ...] = ()
     tolerance: float = TOLERANCE
     shares: tuple[float, ...] = ()
-    max_delay_s: float = Settings().max_delay_s
-    expected_delay_s: float | None = None
-    noise: str = "white"
-    noise_ratio: float = 0.0
-    bad_samples: str = "leave_out"
 
     def checked(self) -> StudySettings:
         """The same with the defaults filled in; raises SettingError for what is impossible whatever the source."""
         defaults = self.combined is None and self.P is None and self.Q is None
         combined = COMBINED if defaults else _combined(self.combined)
         windows = _several("windows", (self.windows,) if isinstance(self.windows, str) else self.windows)
-        powers = tuple(_count("weight_power", power) for power in _several("weight_powers", self.weight_powers))
-        base = self._base()._checked()
-        _check_band(base.band_hz)
+        powers = tuple(_count("weight_powers", power) for power in _several("weight_powers", self.weight_powers))
+        base = self._base()
         tolerance = _number("tolerance", self.tolerance)
         if not 0 < tolerance < 1:
             raise SettingError(f"tolerance must be a number between 0 and 1, both excluded, not {tolerance:g}")
@@ -67,25 +74,18 @@ class StudySettings:
         ):
             if (choose or shares) and found != needed:
                 raise SettingError(f"P and Q are chosen, and key frequencies taken, for the {what} only, not {found}")
-        whole = StudySettings(
-            _powers_of_two("P", POWERS if self.P is None else self.P),
-            _powers_of_two("Q", POWERS if self.Q is None else self.Q),
-            combined,
-            windows,
-            powers,
-            base.estimator,
-            base.decimator,
-            base.detrend,
-            base.band_hz,
-            bool(self.timing),
-            choose,
-            tolerance,
-            shares,
-            base.max_delay_s,
-            base.expected_delay_s,
-            base.noise,
-            base.noise_ratio,
-            base.bad_samples,
+        whole = dataclasses.replace(
+            self,
+            **{name: getattr(base, name) for name in _METHOD},
+            P=_powers_of_two("P", POWERS if self.P is None else self.P),
+            Q=_powers_of_two("Q", POWERS if self.Q is None else self.Q),
+            combined=combined,
+            windows=windows,
+            weight_powers=powers,
+            timing=bool(self.timing),
+            choose=choose,
+            tolerance=tolerance,
+            shares=shares,
         )
         for kind in whole._kinds():
             Evaluator(1024, 1.0, dataclasses.replace(kind, band_hz=None))
@@ -97,17 +97,7 @@ class StudySettings:
 
     def _base(self) -> Settings:
         """What all cells share."""
-        return Settings(
-            self.estimator,
-            decimator=self.decimator,
-            detrend=self.detrend,
-            band_hz=self.band_hz,
-            max_delay_s=self.max_delay_s,
-            expected_delay_s=self.expected_delay_s,
-            noise=self.noise,
-            noise_ratio=self.noise_ratio,
-            bad_samples=self.bad_samples,
-        )
+        return Settings(**{name: getattr(self, name) for name in _METHOD})
 
     def _grid(self) -> list[tuple[int, int]]:
         most_p, most_q = self.combined or (math.inf, math.inf)
@@ -117,7 +107,7 @@ class StudySettings:
         """The settings of each window with each weight power, at P = Q = 1."""
         base = self._base()
         return [
-            dataclasses.replace(base, window=window, weight_power=power)._checked()
+            dataclasses.replace(base, window=window, weight_power=power)
             for window in self.windows
             for power in self.weight_powers
         ]
@@ -174,12 +164,6 @@ def _shares(shares: Any) -> tuple[float, ...]:
         if numbers.count(share) > 1:
             raise SettingError(f"shares hold {share:g} twice: give every value once")
     return numbers
-
-
-def _check_band(band_hz: tuple[float, float] | None) -> None:
-    """An impossible band is misuse; one that merely leaves no bin is a result."""
-    if band_hz is not None and not 0 <= band_hz[0] <= band_hz[1] < math.inf:
-        raise SettingError(f"band_hz must be 0 <= low <= high in Hz, found {band_hz[0]:g} to {band_hz[1]:g}")
 
 
 def _listed(values: Iterable[object] | None) -> str:

@@ -138,18 +138,18 @@ def assess(
     asked = moving_s is not None or hop_s is not None
     window_s = min(MOVING_S, t.size / rate_hz / 4) if moving_s is None else moving_s
     hop_s = max(window_s / READINGS_PER_WINDOW, 1 / rate_hz) if hop_s is None else hop_s
-    trusted_settings = _trusted(for_record, asked_for.expected_delay_s)
+    of_trusted = trusted_settings(for_record, asked_for.expected_delay_s)
     trusted = tracking
-    if tracking.settings != trusted_settings:
-        trusted = Evaluator(t.size, rate_hz, trusted_settings).evaluate(t, m)
+    if tracking.settings != of_trusted:
+        trusted = Evaluator(t.size, rate_hz, of_trusted).evaluate(t, m)
         if still is not None:
             trusted = _without_numbers(trusted, still)
     moving, trusted_moving, moving_note = None, None, None
     try:
         moving = _moving(t, m, rate_hz, window_s, hop_s, for_windows)
         trusted_moving = moving
-        if moving.settings != trusted_settings:
-            trusted_moving = _moving(t, m, rate_hz, window_s, hop_s, trusted_settings)
+        if moving.settings != of_trusted:
+            trusted_moving = _moving(t, m, rate_hz, window_s, hop_s, of_trusted)
     except (SettingError, SignalError) as error:
         if asked:
             raise type(error)(f"moving windows of {window_s:g} s: {error}") from None
@@ -182,12 +182,12 @@ def assess(
         t, m, tracking, trusted, moving, response, found_indices.rms_error_percent, depends, units, names
     )
     suspect = "mean" if "offset" in warnings and "drift" not in warnings else "linear"
-    variants = _variants(t, m, tracking, trusted_settings, slopes, suspect) if differ(tracking, trusted) else {}
+    variants = _variants(t, m, tracking, of_trusted, slopes, suspect) if differ(tracking, trusted) else {}
     if without_bad is not tracking:
         variants["bad samples"] = without_bad
     argument, said = argued(t, tracking, trusted, depends, slopes, variants, warnings, unit, start_s)
     evaluation = dataclasses.asdict(tracking.settings) | _factor_settings(factors)
-    evaluation["expected_delay_s"] = trusted_settings.expected_delay_s
+    evaluation["expected_delay_s"] = of_trusted.expected_delay_s
     return Assessment(
         file=file,
         actuator=actuator,
@@ -239,7 +239,7 @@ def without_trusted(settings: Settings) -> Settings:
     return dataclasses.replace(settings, expected_delay_s=None) if settings.estimator == "fei" else settings
 
 
-def _trusted(settings: Settings, expected_delay_s: float | None) -> Settings:
+def trusted_settings(settings: Settings, expected_delay_s: float | None) -> Settings:
     """Least squares on every sample, with the same window and band; two sensors are never assumed to share a zero."""
     return dataclasses.replace(
         settings,
@@ -250,7 +250,7 @@ def _trusted(settings: Settings, expected_delay_s: float | None) -> Settings:
         weight_power=2,
         detrend="linear" if settings.detrend == "linear" else "mean",
         expected_delay_s=expected_delay_s,
-    )._checked()
+    )
 
 
 def _moving(
@@ -261,7 +261,7 @@ def _moving(
     hop_s: float,
     settings: Settings,
 ) -> MovingTracking:
-    return evaluate_moving(target, measured, rate_hz, window_s=window_s, hop_s=hop_s, **dataclasses.asdict(settings))
+    return evaluate_moving(target, measured, rate_hz, settings, window_s=window_s, hop_s=hop_s)
 
 
 def _response(
@@ -332,8 +332,7 @@ def _chosen(
 ) -> Factors:
     if unknown := [name for name in choose if name not in ("P", "Q")]:
         raise SettingError(f"choose takes P and Q, not {unknown[0]!r}")
-    given = dataclasses.asdict(settings)
-    p, q = given.pop("data_decimation"), given.pop("frequency_decimation")
+    p, q = settings.data_decimation, settings.frequency_decimation
     return choose_factors(
         target,
         measured,
@@ -341,7 +340,7 @@ def _chosen(
         tolerance=tolerance,
         data_decimation=None if "P" in choose else p,
         frequency_decimation=None if "Q" in choose else q,
-        **given,
+        settings=settings,
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from rthstrack.evaluation.factors import key_frequencies
 from rthstrack.evaluation.monitor import Monitor
+from rthstrack.evaluation.settings import Settings
 from rthstrack.evaluation.tracking import evaluate
 from rthstrack.reproduction import paper
 from rthstrack.reproduction.claims.combined import spans
@@ -101,7 +102,7 @@ def _q_matters_more(r: Results) -> Claim:
 
 def future_work(r: Results) -> Iterator[Claim]:
     """Section 6, what the authors wished for, each tried on a test of known gain and delay."""
-    window = {"window": "tukey", "detrend": "mean"}
+    tukey = Settings(window="tukey", detrend="mean")
     for what, name, delay_s, where in (
         ("more complicated nonlinear properties, as stiffness degradation", "degrading", 5e-3, "Baber-Wen specimen"),
         ("multiple degrees of freedom", "three storeys", 1e-3, "a shear building of three storeys, lowest actuator"),
@@ -111,11 +112,11 @@ def future_work(r: Results) -> Iterator[Claim]:
             yield _done(what, f"{where}: unstable", (math.nan, math.nan), delay_s, "docs/virtual-tests.md", "tukey")
             continue
         target, measured = (x.reshape(len(x), -1)[:, 0] for x in (run.target, run.measured))
-        found = evaluate(target, measured, run.rate_hz, **window)  # type: ignore[arg-type]
+        found = evaluate(target, measured, run.rate_hz, tukey)
         read = float(found.amplitude), float(found.delay_s)
         yield _done(what, f"{where}, CHY101-N", read, delay_s, "docs/virtual-tests.md", "tukey")
     run = r.runs["nonlinear-chy101-n"]
-    key = key_frequencies(run.target, run.rate_hz, 0.99, **window)
+    key = key_frequencies(run.target, run.rate_hz, 0.99, tukey)
     at_key = key.evaluate(run.target, run.measured)
     n_bins = r.studies[SPECTRAL].cell(source="nonlinear-chy101-n").n_bins
     yield _done(
