@@ -144,6 +144,11 @@ soak: .venv/ready toolchain ## 10^8 samples through the monitor: the last readin
 docs: .venv/ready toolchain ## documentation of the Rust core, in target/doc
 	@RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
 
+.PHONY: settings
+settings: .venv/built ## writes Python's settings and docs/settings.md anew from the core's table
+	@$(BIN)/python reference/make_settings.py
+	@$(BIN)/ruff format --quiet python/rthstrack/evaluation/settings.py
+
 .PHONY: golden
 golden: .venv/ready ## writes tests/golden anew from the NumPy twin
 	@$(BIN)/python reference/make_golden.py

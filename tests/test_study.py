@@ -190,12 +190,12 @@ NONSENSE: list[tuple[dict[str, Any], str]] = [
     ({"windows": ["hann", "hann"]}, "windows holds 'hann' twice"),
     ({"windows": ["hanning"]}, "window must be one of .*, not 'hanning'"),
     ({"weight_powers": [17]}, "weight_power must be a whole number from 1 to 16, not 17"),
-    ({"weight_powers": ["x"]}, "weight_power must be a whole number, not 'x'"),
+    ({"weight_powers": ["x"]}, "weight_powers must be a whole number, not 'x'"),
     ({"detrend": "cubic"}, "detrend must be one of .*, not 'cubic'"),
     ({"decimator": "boxcar"}, "decimator must be one of .*, not 'boxcar'"),
     ({"estimator": "best"}, "estimator must be .*, not 'best'"),
-    ({"band_hz": (20, 1)}, "band_hz must be two finite frequencies 0 <= low <= high, not (20, 1)"),
-    ({"band_hz": (-1, 1)}, "band_hz must be two finite frequencies 0 <= low <= high, not (-1, 1)"),
+    ({"band_hz": (20, 1)}, "band_hz must be two finite frequencies 0 <= low <= high, not \\(20, 1\\)"),
+    ({"band_hz": (-1, 1)}, "band_hz must be two finite frequencies 0 <= low <= high, not \\(-1, 1\\)"),
     ({"band_hz": 4}, "band_hz must be two finite frequencies"),
 ]
 
