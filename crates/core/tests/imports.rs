@@ -139,7 +139,8 @@ fn paths(code: &str) -> Vec<Vec<&str>> {
             let end = after.find(';').unwrap_or(after.len());
             expand(&after[..end], &[], &mut paths);
             rest = &after[end..];
-        } else if word.contains("::") {
+        } else if word.contains("::") && !after.starts_with('!') {
+            // A macro's place is the crate's root, whichever module it is of.
             paths.push(word.split("::").collect());
         }
     }

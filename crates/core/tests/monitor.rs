@@ -349,12 +349,13 @@ fn settings_that_cannot_be_are_refused_with_what_they_must_be() {
     for (config, expected) in [
         (MonitorConfig { rate_hz: 0.0, ..config }, "rate_hz must be a positive finite number, not 0"),
         (
-            MonitorConfig { window_s: 0.0, ..config },
-            "window_s must be from 0.00390625 to 4096 s (4 to 4194304 samples at 1024 Hz), not 0",
+            MonitorConfig { window_s: 0.001, ..config },
+            "window_s must be from 0.00390625 to 4096 s (4 to 4194304 samples at 1024 Hz), not 0.001",
         ),
+        (MonitorConfig { window_s: 0.0, ..config }, "window_s must be a positive duration in seconds, not 0"),
         (MonitorConfig { window_s: 1e9, ..config }, "window_s must be from"),
-        (MonitorConfig { window_s: f64::NAN, ..config }, "window_s must be from"),
-        (MonitorConfig { update_hz: 0.0, ..config }, "update_hz must be above 0 and at most 1024 Hz"),
+        (MonitorConfig { window_s: f64::NAN, ..config }, "window_s must be a positive duration in seconds, not NaN"),
+        (MonitorConfig { update_hz: 0.0, ..config }, "update_hz must be a positive frequency in hertz, not 0"),
         (
             MonitorConfig {
                 update_hz: 200.0,

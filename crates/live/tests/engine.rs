@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use rthstrack::{Monitor, MonitorConfig, MonitorState, Reading, Reason};
+use rthstrack::{EvaluatorConfig, Monitor, MonitorConfig, MonitorState, Reading, Reason};
 use rthstrack_live::alarm::{Alarm, AlarmConfig, Change, Kind};
 use rthstrack_live::engine::{Engine, EngineConfig, Outlet, Sample, Totals};
 
