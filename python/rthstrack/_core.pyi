@@ -25,10 +25,12 @@ __all__ = [
     "from_matrices",
     "index_histories",
     "indices",
+    "is_unit_suffix",
     "prior_bounds",
     "read_text",
     "sdof",
     "shear_building",
+    "unit",
 ]
 
 _Averaged = tuple[float, float, float, float, complex]
@@ -210,3 +212,5 @@ def index_histories(
     force: NDArray[Any] | None,
 ) -> tuple[_Array, _Array, _Array, _Array | None]: ...
 def read_text(content: bytes) -> dict[str, Any]: ...
+def unit(text: str) -> tuple[str, float] | None: ...
+def is_unit_suffix(text: str) -> bool: ...

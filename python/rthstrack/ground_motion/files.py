@@ -10,7 +10,7 @@ from typing import Literal
 from rthstrack.errors import RecordingError, SettingError, SignalError
 from rthstrack.ground_motion.motion import GroundMotion
 from rthstrack.recording.motion_files import Quantity, read_motion
-from rthstrack.recording.readers.at2 import ACCELERATION_UNITS, acceleration_unit
+from rthstrack.recording.readers.at2 import acceleration_unit
 
 
 def read_ground_motion(
@@ -41,7 +41,7 @@ def read_ground_motion(
 
 _ACCELERATION = Quantity(
     "acceleration",
-    ", ".join(ACCELERATION_UNITS),
+    "g, gal, cm/s2, m/s2, mm/s2, in/s2, ft/s2",
     acceleration_unit,
     # By its unit, by `ground` or by `acc` in its name.
     (

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rthstrack.units import is_length
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -28,7 +30,6 @@ STRONGEST_S = 4.0
 ESTIMATORS = {"fei": "published", "aligned": "aligned", "least_squares": "least squares"}
 
 _ROLES = {"whole": ("target", "measured"), "compensator": ("target", "command"), "actuator": ("command", "measured")}
-_LENGTHS = {"m", "cm", "mm", "um", "µm", "μm", "in", "inch", "inches", "ft"}
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -39,7 +40,7 @@ def signal_roles(part: str) -> tuple[str, str]:
 
 def quantity(unit: str | None) -> str:
     """The quantity that a unit measures, as far as it tells: "Displacement" for a length, else "Signal"."""
-    return "Displacement" if unit is not None and unit.strip().lower() in _LENGTHS else "Signal"
+    return "Displacement" if is_length(unit) else "Signal"
 
 
 def with_unit(name: str, unit: str | None) -> str:
