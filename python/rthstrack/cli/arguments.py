@@ -9,11 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 from rthstrack.evaluation.presets import PRESETS
 from rthstrack.evaluation.settings import Settings
+from rthstrack.verdict.display import ESTIMATORS as CALLED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-ESTIMATORS = ("fei", "aligned", "least_squares")
+    from rthstrack.errors import RthstrackError
+
+ESTIMATORS = tuple(CALLED)
 
 
 def add_signals(parser: argparse.ArgumentParser, title: str) -> argparse._ArgumentGroup:
@@ -34,6 +37,37 @@ def add_signals(parser: argparse.ArgumentParser, title: str) -> argparse._Argume
         "--resample", type=positive, metavar="HZ", help="interpolate uneven time stamps onto this rate"
     )
     return signals
+
+
+def chosen(args: argparse.Namespace) -> dict[str, Any]:
+    """What `add_signals` asks for, as the arguments of `read_chosen`."""
+    return {
+        "targets": args.target or (),
+        "measured": args.measured or (),
+        "rate_hz": args.rate,
+        "time": args.time,
+        "resample_hz": args.resample,
+        "scale": dict(args.scale),
+        "fill": args.fill,
+        "start_s": args.start,
+        "end_s": args.end,
+    }
+
+
+#: What the library's arguments are called on the command line.
+OPTIONS = {
+    "target": "--target",
+    "measured": "--measured",
+    "rate_hz": "--rate HZ",
+    "time": "--time CHANNEL",
+    "resample_hz": "--resample HZ",
+    "fill": "--fill SAMPLES",
+}
+
+
+def told(error: RthstrackError) -> str:
+    """An error's message, its advice in the command's words."""
+    return error.told(OPTIONS)
 
 
 def add_method(parser: argparse.ArgumentParser, *, trusted: bool = False) -> argparse._ArgumentGroup:

@@ -19,9 +19,8 @@ from rthstrack.cli.arguments import (
     positive,
     power_of_two,
 )
-from rthstrack.errors import ConfigurationError, SettingError
+from rthstrack.errors import ConfigurationError, SettingError, printable
 from rthstrack.evaluation.monitor import largest_decimation
-from rthstrack.live import printable
 from rthstrack.live.layout import default_layout, layout_from, read_layout
 
 if TYPE_CHECKING:
