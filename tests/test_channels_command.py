@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from rthstrack.cli import channels
+from rthstrack.cli import channels, main
+from rthstrack.errors import RecordingError
+from rthstrack.studies.pairs import read_pairs
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -119,3 +121,17 @@ def test_the_listing_of_every_shared_record(shared: Path, capsys: pytest.Capture
         "chy101n_boucwen.npz": 1024.0,
         "chy101n_linear.npz": 1024.0,
     }
+
+
+def test_advice_speaks_of_arguments_in_the_library_and_of_options_in_the_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "{time}.csv"
+    file.write_text("a,b\n1.5,2\n3,4\n2,8\n")
+    with pytest.raises(RecordingError) as caught:
+        read_pairs(file)
+    assert str(caught.value).startswith(f"{file}: no sampling rate: ")
+    assert str(caught.value).endswith("; give rate_hz or time")
+    assert main(["evaluate", str(file)]) == 1
+    assert f"{file}: no sampling rate: " in (err := capsys.readouterr().err)
+    assert err.endswith("; give --rate HZ or --time CHANNEL\n")

@@ -69,7 +69,8 @@ def test_all_mistakes_are_told_at_once_a_line_each_and_nothing_is_started(
     assert all(line.startswith("rthstrack: ") for line in err)
     wanted = [
         "--listen: expected udp://HOST:PORT", "--rate is missing", "counter: expected one of", "byte_ordr: no such key",
-        "actuator[1].measured: missing", "--window: expected a positive", "--band: expected two finite frequencies", "--estimator: "
+        "actuator[1].measured: missing", "--window: expected a positive", "--band: expected two finite frequencies",
+        "--estimator: "
         "expected one of", "-P: expected a power of two", "--critical-fraction speaks of", "--page-host speaks of",
         "--hysteresis: expected", "is there already", "there is no directory", "--readings: expected a port",
         "--control: expected a port",

@@ -15,7 +15,7 @@ import pytest
 import scipy.io
 from nptdms import TdmsWriter
 
-from rthstrack.errors import RecordingError
+from rthstrack.errors import RecordingError, printable
 from rthstrack.recording import Recording, read_recording
 from test_readers_formats import build_v73, v73, waveform
 
@@ -139,7 +139,7 @@ def read_or_error(path: Path) -> Recording | None:
     except RecordingError as error:
         message = str(error)
         assert message.startswith(f"{path}: ")
-        assert message.isprintable()
+        assert message == printable(message)
         assert len(message) <= 1000
         return None
 

@@ -167,8 +167,8 @@ def test_the_rate_given_goes_before_everything_and_contradictions_are_noted(tmp_
     recording = read_recording(path, rate_hz=25)
     assert (recording.rate_hz, recording.rate_source) == (25.0, "--rate")
     assert recording.notes == (
-        "header 'Sampling Rate' says 50 Hz, but --rate was followed",
-        "time column 't_s' says 100 Hz, but --rate was followed",
+        "header 'Sampling Rate' says 50 Hz, but the given rate was followed",
+        "time column 't_s' says 100 Hz, but the given rate was followed",
     )
     assert read_recording(path, rate_hz=25, time="t_s").rate_hz == 25.0
 
@@ -181,7 +181,7 @@ def test_a_header_and_a_time_column_that_contradict_each_other_are_an_error(tmp_
         read_recording(path)
     path = stamped(tmp_path, [f"{i * 0.01:.2f}" for i in range(200)], head="Sampling Rate: 100.5\n")
     assert read_recording(path).rate_hz == 100.5
-    with pytest.raises(RecordingError, match=r"header 'fs' says 100 Hz, but header 'dt' says 50 Hz; give --rate"):
+    with pytest.raises(RecordingError, match=r"header 'fs' says 100 Hz, but header 'dt' says 50 Hz; give rate_hz"):
         read_recording(written(tmp_path, "fs: 100\ndt: 0.02\na,b\n1.5,2\n2.5,3\n"))
 
 
@@ -190,7 +190,7 @@ def test_the_time_column_named_goes_before_the_header(tmp_path: Path) -> None:
     path = written(tmp_path, f"Sampling Rate: 100\nt,clock_ms,x\n{rows}")
     recording = read_recording(path, time="clock_ms")
     assert (recording.rate_hz, recording.rate_source) == (500.0, "time column 'clock_ms' (--time)")
-    assert recording.notes == ("header 'Sampling Rate' says 100 Hz, but --time was followed",)
+    assert recording.notes == ("header 'Sampling Rate' says 100 Hz, but the named time was followed",)
     with pytest.raises(ChannelError, match="no channel 'tick'"):
         read_recording(path, time="tick")
 
@@ -334,8 +334,8 @@ def test_stamps_that_repeat_jump_or_jitter_are_an_error_with_statistics(
     message = str(caught.value)
     assert f"time column 't_s' is not uniform: {said}" in message
     assert "steps in s: median" in message
-    assert ("--resample HZ interpolates" in message) == increasing
-    assert "--rate HZ ignores the stamps" in message
+    assert ("resample_hz interpolates" in message) == increasing
+    assert "rate_hz ignores the stamps" in message
     assert read_recording(stamped(tmp_path, ms(*stamps)), rate_hz=250).rate_hz == 250
 
 

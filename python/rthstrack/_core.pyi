@@ -26,11 +26,13 @@ __all__ = [
     "from_matrices",
     "index_histories",
     "indices",
+    "is_unit_suffix",
     "prior_bounds",
     "read_text",
     "sdof",
     "settings_table",
     "shear_building",
+    "unit",
 ]
 
 _Averaged = tuple[float, float, float, float, complex]
@@ -227,3 +229,5 @@ def index_histories(
     force: NDArray[Any] | None,
 ) -> tuple[_Array, _Array, _Array, _Array | None]: ...
 def read_text(content: bytes) -> dict[str, Any]: ...
+def unit(text: str) -> tuple[str, float] | None: ...
+def is_unit_suffix(text: str) -> bool: ...

@@ -1,4 +1,4 @@
-"""The exceptions of rthstrack, all under one base class.
+"""The exceptions of rthstrack, all under one base class, and what may stand in a message.
 
 Every message is one line: what was wrong, what was expected, what was found, what to do.
 """
@@ -7,14 +7,40 @@ from __future__ import annotations
 
 import math
 import os
+import re
+import unicodedata
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
+
+
+def printable(text: str) -> str:
+    """A text of somebody else's with what would command a terminal, or hide in a line, written as an escape."""
+    if text.isprintable():
+        return text
+    harmful = ("Cc", "Cf", "Cs", "Zl", "Zp")
+    return "".join(c.encode("unicode_escape").decode() if unicodedata.category(c) in harmful else c for c in text)
 
 
 class RthstrackError(Exception):
-    """Base class of every error that rthstrack raises on purpose."""
+    """Base class of every error that rthstrack raises on purpose.
+
+    `advice` says what to do; the arguments that it speaks of stand in braces, so that a command can name its options.
+    """
+
+    def __init__(self, *args: object, advice: str = "") -> None:
+        self.advice = advice
+        super().__init__(*args)
+
+    def __str__(self) -> str:
+        return self.told({}) if self.advice else super().__str__()
+
+    def told(self, names: Mapping[str, str]) -> str:
+        """The message with its advice, arguments called as `names` has them."""
+        if not self.advice:
+            return str(self)
+        return f"{self.args[0]}; {re.sub(r'{(.*?)}', lambda found: names.get(found[1], found[1]), self.advice)}"
 
 
 class SignalError(RthstrackError, ValueError):

@@ -50,7 +50,7 @@ class Kind:
 
 def finite(value: Any) -> float | None:
     """A finite number as a float."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         return None
     try:
         number = float(value)
@@ -61,8 +61,9 @@ def finite(value: Any) -> float | None:
 
 def whole(value: Any) -> int | None:
     """A whole number from 0 on."""
+    is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     # What a float64 holds exactly is more than any count or seed needs.
-    return value if isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 1 << 53 else None
+    return int(value) if is_whole and 0 <= value < 1 << 53 else None
 
 
 def many(read: Callable[[Any], Any], length: int | None = None) -> Callable[[Any], Any]:
@@ -92,6 +93,8 @@ def one_of(*choices: Any) -> Kind:
 
 
 NUMBER = Kind("a finite number", finite)
+POSITIVE = Kind("a positive number", lambda value: number if (number := finite(value)) and number > 0 else None)
+NOT_ZERO = Kind("a finite number other than zero", lambda value: finite(value) or None)
 NUMBERS = Kind("a list of finite numbers", many(finite))
 SQUARE = Kind("a square matrix, as a list of rows of finite numbers", _matrix)
 KINDS: dict[Any, Kind] = {

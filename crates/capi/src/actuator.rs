@@ -33,7 +33,7 @@ fn benchmark() -> Actuator {
         gain: 1.0,
         delay: Delay::Constant(0.0),
         dynamics: Dynamics::ServoHydraulic(ServoHydraulic::default()),
-        compensation: Compensation::None,
+        compensation: Compensation::NONE,
         command_converter: Converter::default(),
         displacement_sensor: Converter::default(),
         force_sensor: Converter::default(),

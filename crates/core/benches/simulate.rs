@@ -23,7 +23,7 @@ fn actuator(law: Law, gain: f64, delay_s: f64) -> Actuator {
         gain,
         delay: Delay::Constant(delay_s),
         dynamics: Dynamics::None,
-        compensation: Compensation::None,
+        compensation: Compensation::NONE,
         command_converter: Converter::default(),
         displacement_sensor: Converter::default(),
         force_sensor: Converter::default(),

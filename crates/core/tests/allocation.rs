@@ -120,7 +120,7 @@ fn stepping_an_actuator_allocates_nothing() {
         gain: 1.1,
         delay: Delay::Varying { time_s: vec![0.0, 1.0], delay_s: vec![0.001, 0.0034] },
         dynamics,
-        compensation: Compensation::None,
+        compensation: Compensation::NONE,
         command_converter: Converter::default(),
         displacement_sensor: Converter::default(),
         force_sensor: Converter::default(),

@@ -100,19 +100,17 @@ fn dynamics(object: &Bound<'_, PyAny>) -> PyResult<Dynamics> {
     })
 }
 
+/// A compensator, its kind and its numbers as its class has them.
 fn compensation(object: &Bound<'_, PyAny>) -> PyResult<Compensation> {
     if object.is_none() {
-        return Ok(Compensation::None);
+        return Ok(Compensation::NONE);
     }
-    let name = kind(object)?;
-    Ok(match name.as_str() {
-        "InverseCompensation" => Compensation::Inverse { alpha: number(object, "alpha")? },
-        "PolynomialExtrapolation" => Compensation::Extrapolation {
-            order: object.getattr("order")?.extract()?,
-            delay_s: number(object, "delay_s")?,
-        },
-        _ => return Err(unknown("compensation", &name)),
-    })
+    let py = object.py();
+    let name: String = match object.getattr("kind") {
+        Ok(name) => name.extract()?,
+        Err(_) => return Err(unknown("compensation", &kind(object)?)),
+    };
+    Compensation::new(&name, |parameter| number(object, parameter).ok()).map_err(|error| to_py(py, &error))
 }
 
 fn converter(object: &Bound<'_, PyAny>) -> PyResult<Converter> {

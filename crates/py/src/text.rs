@@ -37,6 +37,20 @@ fn read_text<'py>(py: Python<'py>, content: &[u8]) -> PyResult<Bound<'py, PyDict
     Ok(result)
 }
 
+/// What a unit measures and how many of SI's are in one, or None for a text that is no known unit.
+#[pyfunction]
+fn unit(text: &str) -> Option<(&'static str, f64)> {
+    rthstrack_text::unit(text).map(|unit| (unit.quantity.name(), unit.si))
+}
+
+/// Whether letters behind an underscore in a name are a unit, as they are written.
+#[pyfunction]
+fn is_unit_suffix(text: &str) -> bool {
+    rthstrack_text::is_unit_suffix(text)
+}
+
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(read_text, module)?)
+    module.add_function(wrap_pyfunction!(read_text, module)?)?;
+    module.add_function(wrap_pyfunction!(unit, module)?)?;
+    module.add_function(wrap_pyfunction!(is_unit_suffix, module)?)
 }

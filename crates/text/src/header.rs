@@ -5,6 +5,7 @@ use crate::dialect::{Dialect, Kind};
 use crate::encoding;
 use crate::error::{self, TextError};
 use crate::line::{fields, is_blank, uncommented, unquoted};
+use crate::unit::unit;
 
 /// A line above the numbers.
 pub(crate) struct HeadLine<'a> {
@@ -258,17 +259,13 @@ fn is_statement(line: &[u8]) -> bool {
     })
 }
 
-/// Whether a cell is the name of a unit, or anything in brackets.
+/// Whether a cell may stand in a row of units: a known one, a sign for none, or anything in brackets.
 fn is_unit(cell: &str) -> bool {
-    const UNITS: [&str; 66] = [
-        "-", "--", "1", "s", "sec", "secs", "second", "seconds", "ms", "msec", "us", "µs", "min", "h", "hz", "khz",
-        "m", "mm", "cm", "um", "µm", "nm", "in", "inch", "ft", "n", "kn", "mn", "lbf", "lb", "kip", "kips", "g", "gal",
-        "gn", "m/s", "mm/s", "cm/s", "in/s", "m/s2", "m/s^2", "m/s²", "m/s/s", "mm/s2", "mm/s^2", "cm/s2", "cm/s^2",
-        "v", "mv", "a", "ma", "%", "deg", "rad", "°", "°c", "degc", "c", "pa", "kpa", "mpa", "bar", "psi", "nm", "knm",
-        "um/m",
-    ];
     let bracketed = |open, close| cell.starts_with(open) && cell.ends_with(close);
-    bracketed('(', ')') || bracketed('[', ']') || UNITS.contains(&cell.to_lowercase().as_str())
+    // Letters that name a column (time, an index) more often than they are tonnes or kelvin.
+    let letter = ["t", "k", "l", "j", "w"].contains(&cell.to_lowercase().as_str());
+    let none = ["-", "--", "1"].contains(&cell);
+    bracketed('(', ')') || bracketed('[', ']') || none || (!letter && unit(cell).is_some())
 }
 
 /// What messages call a column.

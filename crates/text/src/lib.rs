@@ -24,8 +24,10 @@ mod line;
 mod number;
 mod stamp;
 mod table;
+mod unit;
 
 pub use delimiter::Delimiter;
 pub use encoding::Encoding;
 pub use error::TextError;
 pub use table::{Column, MISSING_STAMP, Table, Values, read};
+pub use unit::{Quantity, Unit, is_unit_suffix, unit};

@@ -39,7 +39,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return status
     except RthstrackError as error:
-        for line in str(error).splitlines():
+        from rthstrack.cli.arguments import told
+
+        for line in told(error).splitlines():
             print(f"rthstrack: {line}", file=sys.stderr)
         return MISUSE if isinstance(error, SettingError) else 1
     except BrokenPipeError:

@@ -5,14 +5,16 @@ from __future__ import annotations
 import argparse
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from rthstrack.cli.setting_options import spoken
+from rthstrack.errors import SettingError
 from rthstrack.evaluation.presets import PRESETS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-ESTIMATORS = ("fei", "aligned", "least_squares")
+    from rthstrack.errors import RthstrackError
 
 
 def add_signals(parser: argparse.ArgumentParser, title: str) -> argparse._ArgumentGroup:
@@ -33,6 +35,38 @@ def add_signals(parser: argparse.ArgumentParser, title: str) -> argparse._Argume
         "--resample", type=positive, metavar="HZ", help="interpolate uneven time stamps onto this rate"
     )
     return signals
+
+
+def chosen(args: argparse.Namespace) -> dict[str, Any]:
+    """What `add_signals` asks for, as the arguments of `read_chosen`."""
+    return {
+        "targets": args.target or (),
+        "measured": args.measured or (),
+        "rate_hz": args.rate,
+        "time": args.time,
+        "resample_hz": args.resample,
+        "scale": dict(args.scale),
+        "fill": args.fill,
+        "start_s": args.start,
+        "end_s": args.end,
+    }
+
+
+#: What the library's arguments are called on the command line.
+OPTIONS = {
+    "target": "--target",
+    "measured": "--measured",
+    "rate_hz": "--rate HZ",
+    "time": "--time CHANNEL",
+    "resample_hz": "--resample HZ",
+    "fill": "--fill SAMPLES",
+}
+
+
+def told(error: RthstrackError) -> str:
+    """An error's message, its advice and the settings it speaks of in the command's words."""
+    message = error.told(OPTIONS)
+    return spoken(message) if isinstance(error, SettingError) else message
 
 
 def add_method(parser: argparse.ArgumentParser, *, trusted: bool = False) -> argparse._ArgumentGroup:

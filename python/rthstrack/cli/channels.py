@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rthstrack.cli.arguments import told
 from rthstrack.cli.commands import COMMANDS
 from rthstrack.errors import ChannelError, RecordingError
 from rthstrack.recording.pairing import propose_pair
-from rthstrack.recording.readers import read_contents
+from rthstrack.recording.readers import FORMAT_NAMES, read_contents
 from rthstrack.recording.reading import recording_from
 from rthstrack.recording.recording import Recording
 
@@ -25,7 +26,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "channels",
         help=COMMANDS["channels"],
-        description="Lists the channels of recorded files (text, MATLAB, HDF5, TDMS, Parquet, Arrow, NumPy), their "
+        description=f"Lists the channels of recorded files ({', '.join(FORMAT_NAMES)}), their "
         "units, ranges and missing samples, the sampling rate and where it comes from, and the likely "
         "target/measured pair. Exit status: 0 all files were read, 1 some file could not be read, 2 misuse.",
     )
@@ -42,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
         try:
             listed.append(_listing(file))
         except RecordingError as error:
-            failures.append({"file": file, "error": str(error)})
+            failures.append({"file": file, "error": told(error)})
         else:
             if not args.json:
                 print(_table(listed[-1]))
@@ -61,13 +62,13 @@ def _listing(file: str) -> dict[str, Any]:
     try:
         recording = recording_from(contents, file)
     except RecordingError as error:
-        problem = str(error).removeprefix(f"{file}: ")
+        problem = told(error).removeprefix(f"{file}: ")
         recording = recording_from(contents, file, rate_hz=1.0)
         recording = Recording(file, recording.format, recording.channels, None, problem, 0.0, contents.notes)
     try:
         pairs, why = propose_pair(recording)
     except ChannelError as error:
-        pairs, why = [], str(error).removeprefix(f"{file}: ")
+        pairs, why = [], told(error).removeprefix(f"{file}: ")
     return {
         "file": file,
         "format": recording.format,

@@ -12,15 +12,16 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rthstrack.cli.arguments import add_method, add_signals, path, positive, tolerance
+from rthstrack.cli.arguments import add_method, add_signals, chosen, path, positive, told, tolerance
 from rthstrack.cli.commands import COMMANDS
-from rthstrack.cli.setting_options import FACTORS, setting_options, settle, spoken, with_auto
+from rthstrack.cli.progress import counted
+from rthstrack.cli.setting_options import FACTORS, setting_options, settle, with_auto
 from rthstrack.errors import RecordingError, RthstrackError, SettingError, SignalError
 from rthstrack.evaluation.factors import TOLERANCE
 from rthstrack.evaluation.results import json_ready
 from rthstrack.evaluation.tracking import Evaluator
-from rthstrack.recording.pairing import propose_pair
-from rthstrack.recording.reading import read_recording
+from rthstrack.recording.chosen import read_chosen
+from rthstrack.recording.readers import FORMAT_NAMES
 from rthstrack.recording.recording import Recording
 from rthstrack.verdict import display
 from rthstrack.verdict.assessment import Assessment, assess, trusted_settings, without_trusted
@@ -51,9 +52,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "(Guo, Xu and Chen 2014). A positive delay means that measured lags. "
         "Exit status: 0 everything was evaluated, 1 some file failed, 2 misuse, 3 a limit was exceeded.",
     )
-    parser.add_argument(
-        "files", nargs="+", metavar="FILE", help="recorded test: text, MATLAB, HDF5, TDMS, Parquet, Arrow, NumPy"
-    )
+    parser.add_argument("files", nargs="+", metavar="FILE", help=f"recorded test: {', '.join(FORMAT_NAMES)}")
     signals = add_signals(parser, "signals (a channel is named by name, path or #index)")
     signals.add_argument("--command", action="append", metavar="C", help="what compensation sends: judged apart")
     method = add_method(parser, trusted=True)
@@ -83,7 +82,7 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
     try:
         settle(args)
     except SettingError as impossible:
-        misuse(spoken(str(impossible)))
+        misuse(told(impossible))
     _check(args, misuse)
     results, failures = _evaluate_all(args)
     assessments = [a for found in results for a in found]
@@ -110,23 +109,12 @@ def assess_file(file: str, args: argparse.Namespace) -> list[Assessment]:
 
     Raises RecordingError, ChannelError or SignalError, with the file and the channels named.
     """
-    recording = read_recording(file, rate_hz=args.rate, time=args.time, resample_hz=args.resample)
-    if recording.rate_hz is None:
-        raise RecordingError(f"{file}: no sampling rate: {recording.rate_source}; give --rate HZ or --time CHANNEL")
-    if args.target:
-        pairs, proposal = list(zip(args.target, args.measured, strict=True)), None
-    else:
-        pairs, proposal = propose_pair(recording)
+    recording, _, pairs, proposal = read_chosen(file, **chosen(args))
     commands: Sequence[str | None] = args.command or [None] * len(pairs)
     if len(commands) != len(pairs):
         raise RecordingError(
             f"{file}: {len(commands)} --command for {len(pairs)} proposed pairs: name each --target and --measured"
         )
-    if args.fill:
-        recording = recording.filled(args.fill)
-    recording = recording.scaled(dict(args.scale))
-    if args.start is not None or args.end is not None:
-        recording = recording.cut(args.start, args.end)
     found = []
     for actuator, ((target, measured), command) in enumerate(zip(pairs, commands, strict=True)):
         parts = [("whole", target, measured)]
@@ -213,7 +201,7 @@ def _check(args: argparse.Namespace, misuse: Callable[[str], Any]) -> None:
             few = min(one.data_decimation, 2)
             Evaluator(1024, 1.0, one, data_decimation=few, frequency_decimation=1, band_hz=None)
     except SettingError as error:
-        misuse(spoken(str(error)))
+        misuse(told(error))
     if args.start is not None and args.end is not None and args.start >= args.end:
         misuse(f"--start must come before --end, found {args.start:g} and {args.end:g}")
     if args.resample and (args.rate):
@@ -231,7 +219,7 @@ def _evaluate_all(args: argparse.Namespace) -> tuple[list[list[Assessment]], lis
         try:
             return assess_file(file, args)
         except RthstrackError as error:
-            message = str(error)
+            message = told(error)
             return message if message.startswith(file) else f"{file}: {message}"
         except MemoryError:
             return f"{file}: does not fit into memory"
@@ -243,7 +231,7 @@ def _evaluate_all(args: argparse.Namespace) -> tuple[list[list[Assessment]], lis
         from concurrent.futures import ThreadPoolExecutor
 
         with ThreadPoolExecutor(max_workers=min(len(files), os.cpu_count() or 1)) as pool:
-            found = list(_with_progress(pool.map(one, files), len(files)))
+            found = list(counted("evaluating", pool.map(one, files), len(files)))
     results, failures = [], []
     for file, outcome in zip(files, found, strict=True):
         if isinstance(outcome, str):
@@ -251,16 +239,6 @@ def _evaluate_all(args: argparse.Namespace) -> tuple[list[list[Assessment]], lis
         else:
             results.append(outcome)
     return results, failures
-
-
-def _with_progress(outcomes: Iterable[Any], total: int) -> Iterable[Any]:
-    """A progress bar on standard error, where that is a terminal."""
-    if not sys.stderr.isatty():
-        return outcomes
-    from rich.console import Console
-    from rich.progress import track
-
-    return track(outcomes, total=total, description="evaluating", console=Console(stderr=True), transient=True)
 
 
 def _write_outputs(args: argparse.Namespace, assessments: Sequence[Assessment]) -> list[str]:
@@ -395,9 +373,6 @@ def _print_one(console: Console, a: Assessment) -> None:
     console.print()
 
 
-_ESTIMATORS = {"fei": "published (fei)", "aligned": "aligned", "least_squares": "least squares"}
-
-
 def _side_by_side(a: Assessment) -> Table:
     """The estimate asked for and the trusted one, with their 95 % intervals as far as there are any."""
     from rich.table import Table
@@ -408,7 +383,7 @@ def _side_by_side(a: Assessment) -> Table:
     table.add_column("", style="dim", no_wrap=True)
     for t in columns:
         trusted = "trusted (least squares), 95 % interval"
-        table.add_column(trusted if t is a.trusted else _ESTIMATORS[t.settings.estimator])
+        table.add_column(trusted if t is a.trusted else display.estimator_in_full(t.settings.estimator))
     rows = [
         ("amplitude", [_estimate(float(t.amplitude), t.amplitude_interval) for t in columns]),
         (

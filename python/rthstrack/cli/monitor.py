@@ -13,8 +13,7 @@ from rthstrack.cli import addresses
 from rthstrack.cli.commands import COMMANDS
 from rthstrack.cli.monitor_options import Plan, add_options, checked_plan
 from rthstrack.cli.running import Ended, say
-from rthstrack.errors import RthstrackError, SettingError
-from rthstrack.live import printable
+from rthstrack.errors import RthstrackError, SettingError, printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

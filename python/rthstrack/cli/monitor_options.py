@@ -13,10 +13,9 @@ from rthstrack._core import settings_table
 from rthstrack.cli import addresses
 from rthstrack.cli.arguments import count, expected_delay_mistake, not_negative, number, positive
 from rthstrack.cli.setting_options import setting_options
-from rthstrack.errors import ConfigurationError, SettingError
+from rthstrack.errors import ConfigurationError, SettingError, printable
 from rthstrack.evaluation.monitor import largest_decimation
 from rthstrack.evaluation.settings import MonitorSettings
-from rthstrack.live import printable
 from rthstrack.live.layout import default_layout, layout_from, read_layout
 
 if TYPE_CHECKING:

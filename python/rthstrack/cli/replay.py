@@ -12,13 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rthstrack.cli import addresses
-from rthstrack.cli.arguments import add_signals, count, positive
+from rthstrack.cli.arguments import add_signals, chosen, count, positive, told
 from rthstrack.cli.commands import COMMANDS
 from rthstrack.cli.running import Ended, say
 from rthstrack.errors import RecordingError, RthstrackError, SettingError
 from rthstrack.live.layout import DatagramLayout, default_layout, read_layout
-from rthstrack.recording.pairing import propose_pair
-from rthstrack.recording.reading import read_recording
+from rthstrack.recording.chosen import read_chosen
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -99,21 +98,7 @@ class _Signals:
 
 def _read(args: argparse.Namespace) -> tuple[str, _Signals]:
     """What is sent, and in words which channels it is."""
-    recording = read_recording(args.file, rate_hz=args.rate, time=args.time, resample_hz=args.resample)
-    if recording.rate_hz is None:
-        raise RecordingError(
-            f"{args.file}: no sampling rate: {recording.rate_source}; give --rate HZ or --time CHANNEL"
-        )
-    if args.target:
-        pairs = list(zip(args.target, args.measured, strict=True))
-    else:
-        pairs, _ = propose_pair(recording)
-    if args.fill:
-        recording = recording.filled(args.fill)
-    recording = recording.scaled(dict(args.scale))
-    if args.start is not None or args.end is not None:
-        recording = recording.cut(args.start, args.end)
-    assert recording.rate_hz is not None
+    recording, rate_hz, pairs, _ = read_chosen(args.file, **chosen(args))
     channels = [(recording.channel(target), recording.channel(measured)) for target, measured in pairs]
     lengths = {one.name: len(one.values) for pair in channels for one in pair}
     if len(set(lengths.values())) > 1:
@@ -125,7 +110,7 @@ def _read(args: argparse.Namespace) -> tuple[str, _Signals]:
     names = ", ".join(f"target '{target.name}', measured '{measured.name}'" for target, measured in channels[:3])
     names += f" and {len(channels) - 3} more pairs" if len(channels) > 3 else ""
     target, measured = (np.column_stack([pair[i].values for pair in channels]) for i in (0, 1))
-    return names, _Signals(recording.rate_hz, target, measured)
+    return names, _Signals(rate_hz, target, measured)
 
 
 def _check(layout: DatagramLayout, signals: _Signals, args: argparse.Namespace) -> None:
@@ -144,7 +129,7 @@ def _check(layout: DatagramLayout, signals: _Signals, args: argparse.Namespace) 
                 try:
                     layout.check_range(name, i, getattr(signals, name)[:, i])
                 except SettingError as error:
-                    mistakes.append(str(error))
+                    mistakes.append(told(error))
     if mistakes:
         raise SettingError("\n".join(mistakes))
 

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections import Counter
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rthstrack.cli.commands import COMMANDS
+from rthstrack.cli.progress import stages
 from rthstrack.errors import SettingError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
     from rthstrack.reproduction import Reproduction
 
 _DESCRIPTION = """\
@@ -63,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
         if name in given:
             raise SettingError(f"--record {name} is given twice; give every record once")
         given[name] = file
-    with _progress() as progress:
+    with stages() as progress:
         result = reproduce(args.output, records=given, progress=progress)
     _print_text(result, args.output)
     return 0
@@ -74,26 +71,6 @@ def _record(text: str) -> tuple[str, Path]:
     if not (name and equals and file):
         raise argparse.ArgumentTypeError(f"expected NAME=FILE, found '{text}'")
     return name, Path(file)
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str, int, int], Any] | None]:
-    """A bar a stage on standard error, where that is a terminal."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import Progress, TaskID
-
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        stages: dict[str, TaskID] = {}
-
-        def tell(stage: str, done: int, total: int) -> None:
-            if stage not in stages:
-                stages[stage] = bar.add_task(stage, total=total)
-            bar.update(stages[stage], completed=done)
-
-        yield tell
 
 
 def _print_text(result: Reproduction, out: Path) -> None:

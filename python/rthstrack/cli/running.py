@@ -7,7 +7,7 @@ import signal
 import sys
 from typing import Any
 
-from rthstrack.live import printable
+from rthstrack.errors import printable
 
 
 class Ended:

@@ -9,25 +9,26 @@ import math
 import os
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rthstrack.cli.arguments import add_method, add_signals, count, number, positive, tolerance
+from rthstrack.cli.arguments import add_method, add_signals, chosen, count, number, positive, told, tolerance
 from rthstrack.cli.commands import COMMANDS
-from rthstrack.cli.setting_options import setting_options, spoken
+from rthstrack.cli.progress import counted, stage
+from rthstrack.cli.setting_options import setting_options
 from rthstrack.errors import RthstrackError, SettingError
 from rthstrack.evaluation.factors import TOLERANCE
 from rthstrack.evaluation.presets import PRESETS
 from rthstrack.evaluation.results import json_ready
 from rthstrack.evaluation.settings import StudyMethod
+from rthstrack.recording.readers import FORMAT_NAMES
 from rthstrack.studies.cells import Study
 from rthstrack.studies.grid import study
 from rthstrack.studies.pairs import Pair, read_pairs
 from rthstrack.studies.settings import COMBINED, POWERS, WEIGHT_POWERS, WINDOWS, StudySettings, _several
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from rich.console import Console
     from rich.table import Table
@@ -36,13 +37,13 @@ if TYPE_CHECKING:
 
 FAILED = 1
 _METHOD = tuple(one.name for one in dataclasses.fields(StudyMethod))
-_DESCRIPTION = """\
+_DESCRIPTION = f"""\
 Evaluates a test over grids of data decimation P and frequency decimation Q: amplitude, delay,
 their error against the truth where it is known, their change from P = Q = 1, and the computing
 time. By default the grids of Guo, Xu and Chen (2014): P and Q each alone from 1 to 512, and
 combined up to P = 64 and Q = 32. A positive delay means that measured lags.
 
-A SOURCE is a recorded test (text, MATLAB, HDF5, TDMS, Parquet, Arrow, NumPy), a run that `rthstrack
+A SOURCE is a recorded test ({", ".join(FORMAT_NAMES)}), a run that `rthstrack
 simulate` wrote, or a configuration (.toml), which is simulated first. Runs and configurations
 bring the truth with them.
 """
@@ -141,26 +142,23 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
     if args.tolerance is not None and not choose:
         misuse("--tolerance speaks of P and Q that are chosen: give -P auto, -Q auto or both")
     method = {name: getattr(args, name) for name in _METHOD if hasattr(args, name)}
-    try:
-        settings = StudySettings(
-            **method,
-            P=p,
-            Q=q,
-            combined=args.combined and tuple(args.combined),
-            windows=_items(args.windows),
-            weight_powers=_weight_powers(args),
-            timing=not args.no_timing,
-            choose=choose,
-            tolerance=args.tolerance or TOLERANCE,
-            shares=() if args.share is None else _several("share", _items(args.share)),
-        ).checked()
-    except SettingError as impossible:
-        raise SettingError(spoken(str(impossible))) from None
+    settings = StudySettings(
+        **method,
+        P=p,
+        Q=q,
+        combined=args.combined and tuple(args.combined),
+        windows=_items(args.windows),
+        weight_powers=_weight_powers(args),
+        timing=not args.no_timing,
+        choose=choose,
+        tolerance=args.tolerance or TOLERANCE,
+        shares=() if args.share is None else _several("share", _items(args.share)),
+    ).checked()
     _make(args.output)
     pairs, failures = _read_all(args)
     found = None
     if pairs:
-        with _progress("studying") as progress:
+        with stage("studying") as progress:
             found = study(pairs, settings, truth=_truth(args), progress=progress)
     written = _write(found, args) if found is not None else []
     if args.json:
@@ -235,20 +233,9 @@ def _read_all(args: argparse.Namespace) -> tuple[list[Pair], list[tuple[str, str
 
     def one(file: str) -> list[Pair] | str:
         try:
-            return read_pairs(
-                file,
-                targets=args.target or (),
-                measured=args.measured or (),
-                rate_hz=args.rate,
-                time=args.time,
-                resample_hz=args.resample,
-                scale=dict(args.scale),
-                fill=args.fill,
-                start_s=args.start,
-                end_s=args.end,
-            )
+            return read_pairs(file, **chosen(args))
         except RthstrackError as error:
-            message = str(error)
+            message = told(error)
             return message if message.startswith(file) else f"{file}: {message}"
         except MemoryError:
             return f"{file}: does not fit into memory"
@@ -256,29 +243,13 @@ def _read_all(args: argparse.Namespace) -> tuple[list[Pair], list[tuple[str, str
     pairs: list[Pair] = []
     failures = []
     files = list(dict.fromkeys(args.sources))
-    with ThreadPoolExecutor(max_workers=min(len(files), os.cpu_count() or 1)) as pool, _progress("reading") as progress:
-        for done, (file, outcome) in enumerate(zip(files, pool.map(one, files), strict=True), start=1):
-            if progress is not None:
-                progress(done, len(files))
+    with ThreadPoolExecutor(max_workers=min(len(files), os.cpu_count() or 1)) as pool:
+        for file, outcome in zip(files, counted("reading", pool.map(one, files), len(files)), strict=True):
             if isinstance(outcome, str):
                 failures.append((file, outcome))
             else:
                 pairs += outcome
     return pairs, failures
-
-
-@contextmanager
-def _progress(what: str) -> Iterator[Callable[[int, int], object] | None]:
-    """A progress bar on standard error, where that is a terminal."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(what)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
 def _write(found: Study, args: argparse.Namespace) -> list[str]:

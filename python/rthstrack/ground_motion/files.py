@@ -10,7 +10,7 @@ from typing import Literal
 from rthstrack.errors import RecordingError, SettingError, SignalError
 from rthstrack.ground_motion.motion import GroundMotion
 from rthstrack.recording.motion_files import Quantity, read_motion
-from rthstrack.recording.readers.at2 import ACCELERATION_UNITS, acceleration_unit
+from rthstrack.recording.readers.at2 import acceleration_unit
 
 
 def read_ground_motion(
@@ -30,7 +30,7 @@ def read_ground_motion(
     Raises RecordingError or ChannelError, one line, when the file or one of these is missing or cannot be used.
     """
     file = os.fspath(path)
-    read = read_motion(path, _ACCELERATION, channel=channel, unit=unit, rate_hz=rate_hz, layout=layout)
+    read = read_motion(path, ACCELERATION, channel=channel, unit=unit, rate_hz=rate_hz, layout=layout)
     try:
         return GroundMotion(Path(path).stem, read.values, read.rate_hz, read.source, read.notes)
     except SettingError as error:
@@ -39,9 +39,9 @@ def read_ground_motion(
         raise RecordingError(f"{file}: {read.channel}: {error}") from None
 
 
-_ACCELERATION = Quantity(
+ACCELERATION = Quantity(
     "acceleration",
-    ", ".join(ACCELERATION_UNITS),
+    "g, gal, cm/s2, m/s2, mm/s2, in/s2, ft/s2",
     acceleration_unit,
     # By its unit, by `ground` or by `acc` in its name.
     (

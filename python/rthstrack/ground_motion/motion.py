@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rthstrack.errors import SettingError, SignalError
-from rthstrack.ground_motion.checks import _MOST_SAMPLES, _oscillator_mistakes
+from rthstrack.ground_motion.checks import MOST_SAMPLES, oscillator_mistakes
 from rthstrack.recording.readers.at2 import STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ class GroundMotion:
         from scipy.linalg import expm
         from scipy.signal import lfilter
 
-        mistakes = _oscillator_mistakes(period_s, damping_ratio, 1 / self.rate_hz)
+        mistakes = oscillator_mistakes(period_s, damping_ratio, 1 / self.rate_hz)
         if mistakes:
             raise SettingError("; ".join(f"{key}: {message}" for key, message in mistakes))
         finer = max(1, math.ceil(_POINTS_PER_PERIOD / (period_s * self.rate_hz)))
@@ -127,9 +127,9 @@ class GroundMotion:
             if value is not None and not (math.isfinite(value) and value > 0):
                 raise SettingError(f"{self.name}: {what}: expected a positive number, found {value:g}")
         seconds = self.duration_s if duration_s is None else duration_s
-        if not 1 <= seconds * rate_hz <= _MOST_SAMPLES:
+        if not 1 <= seconds * rate_hz <= MOST_SAMPLES:
             raise SettingError(
-                f"{self.name}: expected 1 to {_MOST_SAMPLES} steps, found {seconds * rate_hz:g} "
+                f"{self.name}: expected 1 to {MOST_SAMPLES} steps, found {seconds * rate_hz:g} "
                 f"({seconds:g} s at {rate_hz:g} Hz)"
             )
         last = len(self.acceleration_m_s2) - 1

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from rthstrack.errors import RecordingError, SettingError
-from rthstrack.ground_motion.checks import _near
 from rthstrack.ground_motion.motion import GroundMotion
+from rthstrack.keyed_table import suggestion
 from rthstrack.recording.readers.at2 import STANDARD_GRAVITY_M_S2
 
 #: The record sets of FEMA P695.
@@ -41,7 +41,7 @@ def list_records(set: str | None = None) -> tuple[RecordEntry, ...]:
     Raises RecordingError where the extra `records` is not installed, SettingError for an unknown set.
     """
     if set is not None and set not in SETS:
-        raise SettingError(f"set: expected one of {', '.join(SETS)}, found '{set}'{_near(set, SETS)}")
+        raise SettingError(f"set: expected one of {', '.join(SETS)}, found '{set}'{suggestion(set, SETS)}")
     return tuple(entry for one in SETS if set in (None, one) for entry in _entries(_records_file(one), one))
 
 
@@ -54,7 +54,7 @@ def record(
     record's normalization factor (FEMA P695, appendix A).
     Raises RecordingError where the extra `records` is not installed or there is no such record; near names are offered.
     """
-    entry = _entry(name_or_number, component, set)
+    entry = entry_of(name_or_number, component, set)
     h5py = _h5py()
     file = _records_file(entry.set)
     try:
@@ -75,7 +75,7 @@ def record(
     return replace(motion.scaled(factor), notes=(f"normalized by {factor:g} (FEMA P695, appendix A)",))
 
 
-def _entry(name_or_number: str | int, component: str | None, set: str) -> RecordEntry:
+def entry_of(name_or_number: str | int, component: str | None, set: str) -> RecordEntry:
     """What the sets say of one record; see `record`."""
     if component is not None and component not in ("a", "b"):
         raise SettingError(f"component: expected 'a' or 'b', found '{component}'")
@@ -84,7 +84,7 @@ def _entry(name_or_number: str | int, component: str | None, set: str) -> Record
         name = name_or_number.strip().lower()
         found = [e for e in entries if name in (e.name.lower(), e.name.lower().rpartition("/")[2])]
         if not found:
-            near = _near(name_or_number, [e.name if "/" in name else e.name.rpartition("/")[2] for e in entries])
+            near = suggestion(name.upper(), [e.name if "/" in name else e.name.rpartition("/")[2] for e in entries])
             raise RecordingError(
                 f"no record '{name_or_number}' in the sets of FEMA P695{near}; list_records() has them"
             )

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rthstrack.errors import SettingError
-from rthstrack.ground_motion.checks import _MOST_SAMPLES, _is_whole, _not_positive
+from rthstrack.ground_motion.checks import MOST_SAMPLES, not_positive
 from rthstrack.ground_motion.motion import GroundMotion
+from rthstrack.keyed_table import whole
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -41,7 +42,7 @@ def synthetic_ground_motion(
     scaled to the peak. By default firm ground, rise_s = duration_s / 10, strong_s = 3 duration_s / 10.
     Raises SettingError naming everything that is wrong.
     """
-    mistakes = _synthetic_mistakes(locals())
+    mistakes = synthetic_mistakes(locals())
     if mistakes:
         raise SettingError("; ".join(f"{key}: {message}" for key, message in mistakes))
     from scipy.signal import bilinear, lfilter
@@ -70,19 +71,19 @@ def synthetic_ground_motion(
     return GroundMotion(f"synthetic {seed}", motion, float(rate_hz), source)
 
 
-def _synthetic_mistakes(settings: Mapping[str, Any]) -> Mistakes:
+def synthetic_mistakes(settings: Mapping[str, Any]) -> Mistakes:
     """What is wrong with the arguments of `synthetic_ground_motion`."""
     mistakes: Mistakes = []
-    if not (_is_whole(settings["seed"]) and settings["seed"] >= 0):
+    if whole(settings["seed"]) is None:
         mistakes.append(("seed", f"expected a whole number from 0 on, found {settings['seed']!r}"))
     optional = [key for key in ("rise_s", "strong_s") if settings[key] is not None]
     positive = ("duration_s", "rate_hz", "peak_m_s2", "ground_frequency_hz", "ground_damping_ratio")
-    mistakes += _not_positive(settings, (*positive, "high_pass_hz", "high_pass_damping_ratio", *optional))
+    mistakes += not_positive(settings, (*positive, "high_pass_hz", "high_pass_damping_ratio", *optional))
     if mistakes:
         return mistakes
     n, duration = settings["duration_s"] * settings["rate_hz"], settings["duration_s"]
-    if not 100 <= n <= _MOST_SAMPLES:
-        mistakes.append(("duration_s", f"expected 100 to {_MOST_SAMPLES} samples in all, found {n:g}"))
+    if not 100 <= n <= MOST_SAMPLES:
+        mistakes.append(("duration_s", f"expected 100 to {MOST_SAMPLES} samples in all, found {n:g}"))
     if not settings["high_pass_hz"] < settings["ground_frequency_hz"] <= settings["rate_hz"] / 4:
         mistakes.append(
             (

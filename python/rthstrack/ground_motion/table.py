@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import inspect
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rthstrack.errors import RthstrackError, SettingError
-from rthstrack.ground_motion.checks import _is_number, _is_whole, _near, _not_positive, _oscillator_mistakes, _unknown
-from rthstrack.ground_motion.files import _ACCELERATION, read_ground_motion
-from rthstrack.ground_motion.records import SETS, _entry, record
-from rthstrack.ground_motion.synthetic import _synthetic_mistakes, synthetic_ground_motion
+from rthstrack.ground_motion.checks import oscillator_mistakes
+from rthstrack.ground_motion.files import ACCELERATION, read_ground_motion
+from rthstrack.ground_motion.records import SETS, entry_of, record
+from rthstrack.ground_motion.synthetic import synthetic_ground_motion, synthetic_mistakes
+from rthstrack.keyed_table import KINDS, NOT_ZERO, NUMBER, POSITIVE, Table, one_of
 from rthstrack.recording.motion_files import KEYS, file_mistakes
 
 if TYPE_CHECKING:
@@ -33,27 +33,9 @@ def check_ground_motion(table: object, base_dir: str | os.PathLike[str] | None =
     """
     if not isinstance(table, Mapping):
         return [("ground_motion", f"expected a table, found {table!r}")]
-    known = (*_SOURCES, *_SCALINGS, *(key for keys in _OF_SOURCE.values() for key in keys))
-    mistakes = _unknown(table, known, "ground_motion")
-    sources = [key for key in _SOURCES if key in table]
-    if len(sources) != 1:
-        found = " and ".join(sources) or "none"
-        mistakes.append(("ground_motion", f"expected exactly one of {', '.join(_SOURCES)}, found {found}"))
-    for source, keys in _OF_SOURCE.items():
-        mistakes += [
-            (f"ground_motion.{key}", f"goes with {source}, which is not given")
-            for key in keys
-            if key in table and sources and source not in sources
-        ]
-    for source, check in (("record", _record_mistakes), ("synthetic", _synthetic_table_mistakes)):
-        if source in table:
-            mistakes += [(f"ground_motion.{key}", message) for key, message in check(table[source])]
-    if "file" in table:
-        of_file = file_mistakes(table, base_dir, _ACCELERATION)
-        mistakes += [(f"ground_motion.{key}", message) for key, message in of_file]
-    if not isinstance(table.get("normalized", False), bool):
-        mistakes.append(("ground_motion.normalized", f"expected true or false, found {table['normalized']!r}"))
-    return mistakes + [(f"ground_motion.{key}", message) for key, message in _scaling_mistakes(table)]
+    root = Table(table, "ground_motion", [])
+    _read(root, base_dir)
+    return root.mistakes
 
 
 def ground_motion_from(table: Mapping[str, Any], base_dir: str | os.PathLike[str]) -> GroundMotion:
@@ -92,54 +74,59 @@ def _asked(value: Any) -> tuple[str | int, str | None, str]:
     return value["number"], value["component"], value.get("set", SETS[0])
 
 
-def _record_mistakes(value: object) -> Mistakes:
-    if isinstance(value, Mapping):
-        mistakes = _unknown(value, ("set", "number", "component"), "record")
-        mistakes += [("record", f"{key} is missing") for key in ("number", "component") if key not in value]
-        number, component, chosen = value.get("number", 1), value.get("component", "a"), value.get("set", SETS[0])
-        if not _is_whole(number):
-            mistakes.append(("record.number", f"expected a whole number, found {number!r}"))
-        if component not in ("a", "b"):
-            mistakes.append(("record.component", f"expected 'a' or 'b', found {component!r}"))
-        if chosen not in SETS:
-            near = _near(str(chosen), SETS)
-            mistakes.append(("record.set", f"expected one of {', '.join(SETS)}, found {chosen!r}{near}"))
-        if mistakes:
-            return mistakes
-    elif not isinstance(value, str):
-        return [("record", f"expected a name or a table of set, number and component, found {value!r}")]
-    try:
-        _entry(*_asked(value))
-    except RthstrackError as error:
-        return [("record", str(error))]
-    return []
+def _read(root: Table, base_dir: str | os.PathLike[str] | None) -> None:
+    """Notes everything wrong with the table."""
+    sources = [key for key in _SOURCES if key in root.values]
+    if len(sources) != 1:
+        found = " and ".join(sources) or "none"
+        root.mistakes.append((root.key, f"expected exactly one of {', '.join(_SOURCES)}, found {found}"))
+    for source, keys in _OF_SOURCE.items():
+        for key in keys:
+            if key in root.values and sources and source not in sources:
+                root.note(key, f"goes with {source}, which is not given")
+    if "record" in root.values:
+        _read_record(root)
+    if (synthetic := root.table("synthetic")) is not None:
+        defaults = {name: one.default for name, one in inspect.signature(synthetic_ground_motion).parameters.items()}
+        for key, message in synthetic_mistakes({**defaults, **synthetic.values}):
+            synthetic.note(key, message)
+        synthetic.close(defaults)
+    if "file" in root.values:
+        root.mistakes += [
+            (root.path(key), message) for key, message in file_mistakes(root.values, base_dir, ACCELERATION)
+        ]
+    root.take("normalized", KINDS[bool], False)
+    _read_scaling(root)
+    root.close((*_SOURCES, *(key for keys in _OF_SOURCE.values() for key in keys)))
 
 
-def _synthetic_table_mistakes(value: object) -> Mistakes:
-    if not isinstance(value, Mapping):
-        return [("synthetic", f"expected a table, as {{ seed = 1, duration_s = 40 }}, found {value!r}")]
-    defaults = {name: one.default for name, one in inspect.signature(synthetic_ground_motion).parameters.items()}
-    unknown = _unknown(value, tuple(defaults), "synthetic")
-    return unknown + [(f"synthetic.{key}", message) for key, message in _synthetic_mistakes({**defaults, **value})]
+def _read_record(root: Table) -> None:
+    value, n_mistakes = root.values["record"], len(root.mistakes)
+    if isinstance(value, str):
+        root.known.append("record")
+    elif (table := root.table("record")) is not None:
+        table.take("number", KINDS[int])
+        table.take("component", one_of("a", "b"))
+        table.take("set", one_of(*SETS), SETS[0])
+        table.close()
+    if len(root.mistakes) == n_mistakes:
+        try:
+            entry_of(*_asked(value))
+        except RthstrackError as error:
+            root.note("record", str(error))
 
 
-def _scaling_mistakes(table: Mapping[str, Any]) -> Mistakes:
-    given = [key for key in _SCALINGS if key in table]
-    mistakes: Mistakes = []
+def _read_scaling(root: Table) -> None:
+    given = [key for key in _SCALINGS if key in root.values]
     if len(given) > 1:
-        mistakes.append((given[1], f"expected at most one of {', '.join(_SCALINGS)}, found {' and '.join(given)}"))
-    factor = table.get("factor", 1)
-    if not (_is_number(factor) and math.isfinite(factor) and factor != 0):
-        mistakes.append(("factor", f"expected a finite number other than zero, found {factor!r}"))
-    mistakes += _not_positive(table, ("peak_m_s2", "arias_m_s"))
-    spectral = table.get("spectral_acceleration")
-    if isinstance(spectral, Mapping):
-        keys = ("value_m_s2", "period_s", "damping_ratio")
-        found = _unknown(spectral, keys, "spectral_acceleration")
-        found += [("spectral_acceleration", f"{key} is missing") for key in keys[:2] if key not in spectral]
-        inner = _not_positive(spectral, ("value_m_s2",))
-        inner += _oscillator_mistakes(spectral.get("period_s", 1.0), spectral.get("damping_ratio", 0.05))
-        return mistakes + found + [(f"spectral_acceleration.{key}", message) for key, message in inner]
-    if spectral is not None:
-        mistakes.append(("spectral_acceleration", f"expected a table of value_m_s2 and period_s, found {spectral!r}"))
-    return mistakes
+        root.note(given[1], f"expected at most one of {', '.join(_SCALINGS)}, found {' and '.join(given)}")
+    root.take("factor", NOT_ZERO, 1.0)
+    root.take("peak_m_s2", POSITIVE, None)
+    root.take("arias_m_s", POSITIVE, None)
+    if (spectral := root.table("spectral_acceleration")) is not None:
+        spectral.take("value_m_s2", POSITIVE)
+        period_s = spectral.take("period_s", NUMBER, stand_in=1.0)
+        damping_ratio = spectral.take("damping_ratio", NUMBER, 0.05)
+        for key, message in oscillator_mistakes(period_s, damping_ratio):
+            spectral.note(key, message)
+        spectral.close()

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
 import numpy as np
 
-from rthstrack.errors import ConfigurationError, SettingError
+from rthstrack.errors import ConfigurationError, SettingError, printable
 from rthstrack.keyed_table import NUMBER, Kind, Table, one_of, read_toml, shown, suggestion, whole
-from rthstrack.live import printable
 
 if TYPE_CHECKING:
     import os
@@ -153,7 +152,7 @@ class DatagramLayout(_Layout[Field]):
         what = f"{name} of actuator {actuator} cannot be sent as {field.type}"
         if not field.type.startswith("f") and not np.isfinite(values).all():
             raise SettingError(
-                f"{what}: it has samples that are NaN or infinite (--fill SAMPLES interpolates short gaps)"
+                f"{what}: it has samples that are NaN or infinite", advice="{fill} interpolates short gaps"
             )
         kind = np.dtype(_TYPES[field.type])
         info: Any = np.finfo(kind) if field.type.startswith("f") else np.iinfo(kind)

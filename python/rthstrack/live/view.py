@@ -17,7 +17,7 @@ from rich.live import Live as Screen
 from rich.table import Table
 from rich.text import Text
 
-from rthstrack.live import printable
+from rthstrack.errors import printable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

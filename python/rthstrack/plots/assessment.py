@@ -169,7 +169,7 @@ def plot_frequency_response(
             return ax
         above_zero = response.frequency_hz > 0
         frequency, coherence = response.frequency_hz[above_zero], response.coherence[above_zero]
-        sure = coherence >= display.LOW_COHERENCE
+        sure = coherence >= display.DRAWN_GREY_BELOW
         shown = display.judged_range(result.tracking) if isinstance(result, Assessment) else None
         low, high = shown or (float(frequency[0]), float(frequency[-1]))
         low = max(low, float(frequency[0]))
@@ -187,7 +187,7 @@ def plot_frequency_response(
         for coherence_axis in ax[2:]:
             coherence_axis.semilogx(frequency, coherence, color=DOUBTFUL)
             coherence_axis.semilogx(frequency, np.where(sure, coherence, np.nan), color=VALUE, linewidth=1)
-            coherence_axis.axhline(display.LOW_COHERENCE, color=MUTED, linewidth=0.5, linestyle=(0, (1, 2)))
+            coherence_axis.axhline(display.DRAWN_GREY_BELOW, color=MUTED, linewidth=0.5, linestyle=(0, (1, 2)))
             coherence_axis.set_ylim(0, 1.05)
             coherence_axis.set_ylabel("Coherence (-)")
         if isinstance(result, Assessment):

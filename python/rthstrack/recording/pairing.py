@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rthstrack.errors import ChannelError
-from rthstrack.units import is_length, seconds_in, split_unit
+from rthstrack.units import quantity as unit_quantity
+from rthstrack.units import split_unit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -68,11 +69,15 @@ _QUANTITIES = {
 # x_t and x_m, disp_t and disp_m, ...: a letter behind the quantity.
 _LETTERS = {"t": ("target", 0), "d": ("target", 0), "r": ("target", 1), "c": ("target", 2), "m": ("measured", 0)}
 _BEFORE_LETTER = {"x", "u", "d", "f", "disp", "displ", "displacement", "pos", "position", "force", "frc"}
-_UNIT_QUANTITIES = {
-    "force": {"n", "kn", "mn", "lbf", "lb", "lbs", "kip", "kips", "kgf"},
-    "acceleration": {"g", "gal", "m/s2", "m/s^2", "m/s²", "cm/s2", "cm/s^2", "mm/s^2"},
-    "velocity": {"m/s", "mm/s", "cm/s", "in/s"},
-    "voltage": {"v", "mv", "a", "ma"},
+# What a channel is by what its unit measures.
+_BY_UNIT = {
+    "length": "displacement",
+    "time": "other",
+    "force": "force",
+    "acceleration": "acceleration",
+    "velocity": "velocity",
+    "voltage": "voltage",
+    "current": "voltage",
 }
 # What a guess by likeness needs: correlation, lag, gain, and how much of the record is looked at.
 _LIKENESS = 0.9
@@ -109,15 +114,16 @@ def propose_pair(recording: Recording) -> tuple[list[tuple[str, str]], str]:
     elif any(one.role for one in named):
         roles = ", ".join(f"'{channels[one.index].name}' ({one.role})" for one in named if one.role)
         raise ChannelError(
-            f"{recording.file}: no likely target/measured pair: found only {roles}; "
-            "name them with --target and --measured"
+            f"{recording.file}: no likely target/measured pair: found only {roles}",
+            advice="name them: {target}, {measured}",
         )
     else:
         guess = _by_likeness(recording, named)
         if guess is None:
             raise ChannelError(
                 f"{recording.file}: no likely target/measured pair: no name says target, command, measured or "
-                "feedback, and no two channels move alike; name them with --target and --measured"
+                "feedback, and no two channels move alike",
+                advice="name them: {target}, {measured}",
             )
         (target, measured), correlation, lag = guess
         pairs = [(target, measured)]
@@ -147,7 +153,7 @@ def _read_name(index: int, channel: Channel) -> _Named:
     words = _words(stem)
     at, role, rank = _role(words)
     quantities = [(i, kind) for i, word in enumerate(words) for kind, known in _QUANTITIES.items() if word in known]
-    quantity = _quantity_of(channel.unit) or (quantities[0][1] if quantities else None)
+    quantity = _BY_UNIT.get(unit_quantity(channel.unit) or "") or (quantities[0][1] if quantities else None)
     used = {at, *(i for i, _ in quantities)}
     return _Named(index, role, rank, quantity, tuple(word for i, word in enumerate(words) if i not in used))
 
@@ -171,15 +177,6 @@ def _role(words: list[str]) -> tuple[int, str | None, int]:
     return -1, None, 0
 
 
-def _quantity_of(unit: str | None) -> str | None:
-    if is_length(unit):
-        return "displacement"
-    if seconds_in(unit):
-        return "other"
-    plain = (unit or "").strip("[]() ").lower()
-    return next((kind for kind, units in _UNIT_QUANTITIES.items() if plain in units), None)
-
-
 def _by_name(named: list[_Named], channels: tuple[Channel, ...], file: str) -> list[tuple[int, int]]:
     """Pairs by name, of one quantity and length: displacement where there is any, else what there is."""
     for wanted in (("displacement", None), ("force",), ("acceleration",), ("velocity",), ("voltage",)):
@@ -190,8 +187,8 @@ def _by_name(named: list[_Named], channels: tuple[Channel, ...], file: str) -> l
             if not pairs:
                 listed = ", ".join(f"'{channels[one.index].name}'" for one in (*targets, *measured))
                 raise ChannelError(
-                    f"{file}: several channels could be target or measured: {listed}; "
-                    "choose with --target and --measured"
+                    f"{file}: several channels could be target or measured: {listed}",
+                    advice="choose: {target}, {measured}",
                 )
             return [(t, m) for t, m in pairs if len(channels[t].values) == len(channels[m].values)] or pairs
     return []

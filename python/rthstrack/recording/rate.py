@@ -103,9 +103,9 @@ def _settle(contents: Contents, columns: Sequence[_TimeColumn], *, chosen: bool,
     if chosen:
         verdict = columns[0].examine()
         if isinstance(verdict, Irregular):
-            raise RecordingError(f"{file}: {columns[0].what} {verdict.problem}; {_hint(verdict)}")
+            raise RecordingError(f"{file}: {columns[0].what} {verdict.problem}", advice=_hint(verdict))
         ignored = [s for s in contents.statements if not _agree(verdict, s.rate_hz)]
-        said = tuple(f"{s.source} says {s.rate_hz:g} Hz, but --time was followed" for s in ignored)
+        said = tuple(f"{s.source} says {s.rate_hz:g} Hz, but the named time was followed" for s in ignored)
         return _Rate(verdict.rate_hz, columns[0].what, verdict.start_s, said)
     stated = _stated(contents, file)
     numeric = [column for column in columns if not column.is_clock]
@@ -123,7 +123,7 @@ def _settle(contents: Contents, columns: Sequence[_TimeColumn], *, chosen: bool,
         verdict = clock.examine()
         if rate is None:
             if isinstance(verdict, Irregular):
-                raise RecordingError(f"{file}: {clock.what} {verdict.problem}; {_hint(verdict)}")
+                raise RecordingError(f"{file}: {clock.what} {verdict.problem}", advice=_hint(verdict))
             rate = _Rate(verdict.rate_hz, clock.what)
         elif rate.hz is not None:
             notes += _compare_clock(rate, clock, verdict, file)
@@ -139,8 +139,8 @@ def _stated(contents: Contents, file: str) -> _Rate | None:
     for other in whole[1:]:
         if abs(other.rate_hz - whole[0].rate_hz) > _AGREEMENT * whole[0].rate_hz:
             raise RecordingError(
-                f"{file}: {whole[0].source} says {whole[0].rate_hz:g} Hz, but {other.source} says {other.rate_hz:g} Hz"
-                "; give --rate HZ"
+                f"{file}: {whole[0].source} says {whole[0].rate_hz:g} Hz, but {other.source} says {other.rate_hz:g} Hz",
+                advice="give {rate_hz}",
             )
     if whole:
         return _Rate(whole[0].rate_hz, whole[0].source)
@@ -164,7 +164,7 @@ def _told(columns: Sequence[_TimeColumn], stated: _Rate | None, file: str) -> _R
     if irregular and not uniform:
         column, problem = irregular[0]
         says = f"{stated.source} says {stated.hz:g} Hz, but " if stated and stated.hz else ""
-        raise RecordingError(f"{file}: {says}{column.what} {problem.problem}; {_hint(problem)}")
+        raise RecordingError(f"{file}: {says}{column.what} {problem.problem}", advice=_hint(problem))
     if not uniform:
         return None
     column, first = uniform[0]
@@ -172,21 +172,20 @@ def _told(columns: Sequence[_TimeColumn], stated: _Rate | None, file: str) -> _R
         for other, verdict in uniform:
             if not _agree(verdict, stated.hz):
                 raise RecordingError(
-                    f"{file}: {stated.source} says {stated.hz:g} Hz, but {other.what} says {verdict.rate_hz:g} Hz; "
-                    "give --rate HZ"
+                    f"{file}: {stated.source} says {stated.hz:g} Hz, but {other.what} says {verdict.rate_hz:g} Hz",
+                    advice="give {rate_hz}",
                 )
     for other, verdict in uniform[1:]:
         if not _agree(verdict, first.rate_hz):
             return _Rate(
                 None,
-                f"{column.what} says {first.rate_hz:g} Hz, but {other.what} {verdict.rate_hz:g} Hz; "
-                "name one with --time",
+                f"{column.what} says {first.rate_hz:g} Hz, but {other.what} {verdict.rate_hz:g} Hz",
             )
     notes = [f"{c.what} {v.problem}; it was not used" for c, v in irregular]
     if first.rounded and first.high_hz - first.low_hz > 2e-3 * first.rate_hz:
         notes.append(
             f"{column.what} is rounded: any rate from {first.low_hz:.6g} to {first.high_hz:.6g} Hz fits it; "
-            "give --rate HZ if you know better"
+            "give the rate if you know better"
         )
     return _Rate(first.rate_hz, column.what, first.start_s, tuple(notes))
 
@@ -203,7 +202,7 @@ def _compare_clock(rate: _Rate, clock: _TimeColumn, verdict: Uniform | Irregular
     else:
         says = verdict.rate_hz
     raise RecordingError(
-        f"{file}: {rate.source} says {rate.hz:g} Hz, but {clock.what} says {says:g} Hz; give --rate HZ"
+        f"{file}: {rate.source} says {rate.hz:g} Hz, but {clock.what} says {says:g} Hz", advice="give {rate_hz}"
     )
 
 
@@ -222,16 +221,16 @@ def _guessed(contents: Contents) -> _Rate | None:
 def _doubts(contents: Contents, columns: Sequence[_TimeColumn], rate_hz: float) -> list[str]:
     """What in the file contradicts a rate that the user gave."""
     said = [
-        f"{s.source} says {s.rate_hz:g} Hz, but --rate was followed"
+        f"{s.source} says {s.rate_hz:g} Hz, but the given rate was followed"
         for s in contents.statements
         if abs(s.rate_hz - rate_hz) > _AGREEMENT * rate_hz
     ]
     for column in columns:
         verdict = column.examine()
         if isinstance(verdict, Irregular):
-            said.append(f"{column.what} {verdict.problem}; --rate was followed")
+            said.append(f"{column.what} {verdict.problem}; the given rate was followed")
         elif not _agree(verdict, rate_hz):
-            said.append(f"{column.what} says {verdict.rate_hz:g} Hz, but --rate was followed")
+            said.append(f"{column.what} says {verdict.rate_hz:g} Hz, but the given rate was followed")
     return said
 
 
@@ -241,5 +240,5 @@ def _agree(verdict: Uniform, rate_hz: float) -> bool:
 
 def _hint(problem: Irregular) -> str:
     if problem.increasing:
-        return "--resample HZ interpolates onto a uniform grid, --rate HZ ignores the stamps"
-    return "--rate HZ ignores the stamps (--resample needs stamps that increase)"
+        return "{resample_hz} interpolates onto a uniform grid, {rate_hz} ignores the stamps"
+    return "{rate_hz} ignores the stamps ({resample_hz} needs stamps that increase)"

@@ -86,7 +86,7 @@ class Recording:
         Raises RecordingError without a rate or where nothing is left, SettingError for an impossible range.
         """
         if self.rate_hz is None:
-            raise RecordingError(f"{self.file}: cannot cut by time: {self.rate_source}; give --rate HZ")
+            raise RecordingError(f"{self.file}: cannot cut by time: {self.rate_source}", advice="give {rate_hz}")
         start = 0.0 if start_s is None else start_s
         end = math.inf if end_s is None else end_s
         if not (0 <= start < end):

@@ -24,7 +24,7 @@ def _resampled(contents: Contents, file: str, columns: Sequence[_TimeColumn], hz
     from scipy.interpolate import CubicSpline
 
     if not columns:
-        raise RecordingError(f"{file}: cannot resample: no time column; name one with --time, or give --rate HZ")
+        raise RecordingError(f"{file}: cannot resample: no time column", advice="name one: {time}, or give {rate_hz}")
     column = columns[0]
     stamps = column.stamps * column.unit_s
     verdict = column.examine()
@@ -37,7 +37,7 @@ def _resampled(contents: Contents, file: str, columns: Sequence[_TimeColumn], hz
     mean_hz = (len(stamps) - 1) / float(stamps[-1])
     if not 0.9 * mean_hz <= hz <= 10 * mean_hz:
         why = (
-            "fewer would alias, for there is no low-pass (use -P)" if hz < mean_hz else "more would only invent samples"
+            "fewer would alias, for there is no low-pass (use P)" if hz < mean_hz else "more would only invent samples"
         )
         raise SettingError(
             f"{file}: resample: expected {0.9 * mean_hz:.6g} to {10 * mean_hz:.6g} Hz (0.9 to 10 times the mean "

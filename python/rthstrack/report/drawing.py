@@ -230,7 +230,7 @@ def _response_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any] | None:
     return {
         "n": frequency.size,
         "drawn": frequency.size if kept is None else kept.size,
-        "low_coherence": display.LOW_COHERENCE,
+        "low_coherence": display.DRAWN_GREY_BELOW,
         "line": _slope_lines(a.slopes),
         "frequency": blocks.column(_take(frequency, kept)),
         **{name: blocks.column(_take(column, kept)) for name, column in columns.items()},

@@ -413,7 +413,7 @@ def _frequency_charts(a: Assessment, drawing: Mapping[str, Any]) -> str:
         r = a.response
         text = (
             f"Welch's method: {r.n_segments} segments of {r.segment_s:.4g} s, {escape(r.window)} "
-            f"window, aligned by {1e3 * r.align_s:.4g} ms. Grey: coherence below {display.LOW_COHERENCE}, not to be "
+            f"window, aligned by {1e3 * r.align_s:.4g} ms. Grey: coherence below {display.DRAWN_GREY_BELOW}, not to be "
             "relied on. Band: 95 % interval, where the data support one. Dotted: A and d of the evaluation."
         )
         text += _slopes_caption(a)

@@ -11,11 +11,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from rthstrack.errors import RecordingError, SettingError, SignalError
+from rthstrack.errors import SettingError, SignalError
 from rthstrack.evaluation.inputs import _number, _single
 from rthstrack.evaluation.tracking import evaluate
-from rthstrack.recording.pairing import propose_pair
-from rthstrack.recording.reading import read_recording
+from rthstrack.recording.chosen import read_chosen
 from rthstrack.virtual_test.configuration import read_configuration
 from rthstrack.virtual_test.run import Run, read_run_test
 from rthstrack.virtual_test.simulation import simulate, true_tracking
@@ -83,21 +82,18 @@ def read_pairs(
     file = os.fspath(path)
     if file.lower().endswith(".toml"):
         return _pairs_of_run(_simulated(file), file)
-    recording = read_recording(file, rate_hz=rate_hz, time=time, resample_hz=resample_hz)
-    sampled_hz = recording.rate_hz
-    if sampled_hz is None:
-        raise RecordingError(f"{file}: no sampling rate: {recording.rate_source}; give --rate HZ or --time CHANNEL")
-    if targets or measured:
-        if len(targets) != len(measured):
-            raise SettingError(f"one measured for each target is needed, found {len(measured)} for {len(targets)}")
-        channels, proposal = list(zip(targets, measured, strict=True)), None
-    else:
-        channels, proposal = propose_pair(recording)
-    if fill:
-        recording = recording.filled(fill)
-    recording = recording.scaled(scale or {})
-    if start_s is not None or end_s is not None:
-        recording = recording.cut(start_s, end_s)
+    recording, sampled_hz, channels, proposal = read_chosen(
+        file,
+        targets=targets,
+        measured=measured,
+        rate_hz=rate_hz,
+        time=time,
+        resample_hz=resample_hz,
+        scale=scale,
+        fill=fill,
+        start_s=start_s,
+        end_s=end_s,
+    )
     found = []
     for actuator, (asked, answered) in enumerate(channels):
         t, m = recording.channel(asked), recording.channel(answered)

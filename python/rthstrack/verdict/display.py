@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rthstrack.units import is_length
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -19,17 +21,22 @@ if TYPE_CHECKING:
     from rthstrack.evaluation.tracking import MovingTracking, Tracking
 
 #: Gain and delay are drawn grey where the coherence is below this.
-LOW_COHERENCE = 0.8
+DRAWN_GREY_BELOW = 0.8
 
 #: The part of a record that is shown enlarged, in seconds.
 STRONGEST_S = 4.0
 
-#: What the estimators are called beside each other.
+#: Every estimator, and what it is called beside the others.
 ESTIMATORS = {"fei": "published", "aligned": "aligned", "least_squares": "least squares"}
 
 _ROLES = {"whole": ("target", "measured"), "compensator": ("target", "command"), "actuator": ("command", "measured")}
-_LENGTHS = {"m", "cm", "mm", "um", "µm", "μm", "in", "inch", "inches", "ft"}
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def estimator_in_full(name: str) -> str:
+    """What an estimator is called, with its name behind it where that is another: "published (fei)"."""
+    called = ESTIMATORS[name]
+    return called if called == name.replace("_", " ") else f"{called} ({name})"
 
 
 def signal_roles(part: str) -> tuple[str, str]:
@@ -39,7 +46,7 @@ def signal_roles(part: str) -> tuple[str, str]:
 
 def quantity(unit: str | None) -> str:
     """The quantity that a unit measures, as far as it tells: "Displacement" for a length, else "Signal"."""
-    return "Displacement" if unit is not None and unit.strip().lower() in _LENGTHS else "Signal"
+    return "Displacement" if is_length(unit) else "Signal"
 
 
 def with_unit(name: str, unit: str | None) -> str:

@@ -27,7 +27,7 @@ _DRIFT_SHARE, _DRIFT_CYCLES = 0.05, 4.0
 _OFFSET_STD = 0.25
 # Energy this far above the equivalent frequency is no structural response.
 _HIGH_SHARE, _HIGH_FACTOR = 0.02, 8.0
-_LOW_COHERENCE = 0.9
+_COHERENT = 0.9
 _FEW_LEVELS = 64
 # Clipped: so many samples in a row at an extreme so far from the mean, reached at a good part of the highest speed.
 _CLIPPED_RUN, _CLIPPED_STD, _CLIPPED_SPEED = 5, 1.5, 0.2
@@ -210,7 +210,7 @@ def _coherence(tracking: Tracking, response: FrequencyResponse | None, names: tu
     if weight.sum() <= 0:
         return None
     coherence = float((weight * np.nan_to_num(response.coherence)).sum() / weight.sum())
-    if coherence >= _LOW_COHERENCE:
+    if coherence >= _COHERENT:
         return None
     return (
         f"coherence is only {coherence:.2f} over the frequencies that carry the weight: "
@@ -223,7 +223,7 @@ def _delay_spread(tracking: Tracking, trusted: Tracking, response: FrequencyResp
     # A sign or a turn that is not known makes any delay a curve.
     if response is None or tracking.frequency_hz is None or _undetermined(trusted) is not None:
         return None
-    weight = np.where(np.nan_to_num(response.coherence) >= _LOW_COHERENCE, _weighted(tracking, response), 0.0)
+    weight = np.where(np.nan_to_num(response.coherence) >= _COHERENT, _weighted(tracking, response), 0.0)
     share = np.cumsum(weight)
     if share[-1] <= 0:
         return None

@@ -19,16 +19,15 @@ from rthstrack.virtual_test.parts import (
     Actuator,
     BaberWen,
     BoucWen,
+    Compensator,
     Converter,
     Dashpot,
     DelayHistory,
     Element,
     FirstOrder,
-    InverseCompensation,
     KelvinVoigt,
     Maxwell,
     ModalDamping,
-    PolynomialExtrapolation,
     RayleighDamping,
     ServoHydraulic,
     Spring,
@@ -60,10 +59,9 @@ _DYNAMICS: dict[str, type] = {
     "transfer_function": TransferFunction,
     "servo_hydraulic": ServoHydraulic,
 }
-_COMPENSATIONS: dict[str, type] = {"inverse": InverseCompensation, "extrapolation": PolynomialExtrapolation}
 # How a table says which class it is.
 _TAGS = {cls: ("law" if known is _LAWS else "kind", name)
-         for known in (_LAWS, _DYNAMICS, _COMPENSATIONS) for name, cls in known.items()}  # fmt: skip
+         for known in (_LAWS, _DYNAMICS, Compensator.known) for name, cls in known.items()}  # fmt: skip
 _TEST = ("stepping", "rate_hz", "tolerance", "bound_m", "seed")
 _CONVERTERS = ("command_converter", "displacement_sensor", "force_sensor")
 # A number of a degree of freedom beyond this one is a mistake of its own.
@@ -313,7 +311,7 @@ def _actuator(table: Table, alone: bool) -> Actuator:
         values["delay_s"] = (history and history.made(DelayHistory)) or 0.0
     else:
         values["delay_s"] = table.take("delay_s", NUMBER, 0.0)
-    for name, known in (("dynamics", _DYNAMICS), ("compensation", _COMPENSATIONS)):
+    for name, known in (("dynamics", _DYNAMICS), ("compensation", Compensator.known)):
         one = table.table(name)
         values[name] = one and one.one_of("kind", known)
     for name in _CONVERTERS:

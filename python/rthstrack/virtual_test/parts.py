@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -255,17 +255,33 @@ class ServoHydraulic:
     b2: float = 9.9976e4
 
 
+class Compensator:
+    """What makes the command of the target (`cr` stepping only): a class for each of the core's, with its numbers."""
+
+    __slots__ = ()
+    #: What the core and configurations call it.
+    kind: ClassVar[str]
+    #: Every class by its kind.
+    known: ClassVar[dict[str, type[Compensator]]] = {}
+
+    def __init_subclass__(cls) -> None:
+        # Twice for a dataclass with slots: the last is the one that remains.
+        Compensator.known[cls.kind] = cls
+
+
 @dataclass(frozen=True, slots=True)
-class InverseCompensation:
+class InverseCompensation(Compensator):
     """u_n = alpha I_n - (alpha - 1) I_(n-1) (Chen and Ricles)."""
 
+    kind: ClassVar[str] = "inverse"
     alpha: float
 
 
 @dataclass(frozen=True, slots=True)
-class PolynomialExtrapolation:
+class PolynomialExtrapolation(Compensator):
     """The polynomial through order + 1 past targets, `delay_s` apart, read `delay_s` ahead (Horiuchi et al. 1999)."""
 
+    kind: ClassVar[str] = "extrapolation"
     order: Literal[1, 2, 3]
     delay_s: float
 
@@ -299,7 +315,7 @@ class Actuator:
     gain: float = 1.0
     delay_s: float | DelayHistory = 0.0
     dynamics: FirstOrder | TransferFunction | ServoHydraulic | None = None
-    compensation: InverseCompensation | PolynomialExtrapolation | None = None
+    compensation: Compensator | None = None
     command_converter: Converter = Converter()
     displacement_sensor: Converter = Converter()
     force_sensor: Converter = Converter()
@@ -353,11 +369,8 @@ class VirtualTest:
 
         actuators = []
         for actuator in self.actuators:
-            compensation = actuator.compensation
-            if isinstance(compensation, PolynomialExtrapolation) and compensation.order < 0:
-                compensation = replace(compensation, order=1)
             late = max(actuator.force_delay_samples, 0)
-            actuators.append(replace(actuator, compensation=compensation, force_delay_samples=late, **placed(actuator)))
+            actuators.append(replace(actuator, force_delay_samples=late, **placed(actuator)))
         stepping = self.stepping if self.stepping in ("continuous", "cr") else "cr"
         elements = tuple(replace(element, **placed(element)) for element in self.elements)
         return replace(self, elements=elements, actuators=tuple(actuators), stepping=stepping)
@@ -390,9 +403,6 @@ class VirtualTest:
                     found = getattr(item, name, 0)
                     if found < 0:
                         yield Mistake(f"{what}[{i}].{name}", f"expected a whole number of at least 0, found {found}")
-                order = getattr(getattr(item, "compensation", None), "order", 1)
-                if order < 0:
-                    yield Mistake(f"{what}[{i}].compensation.order", f"expected 1, 2 or 3, found {order}")
 
 
 #: What an actuator says of its place in the structure.

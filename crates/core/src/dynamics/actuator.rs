@@ -85,7 +85,7 @@ impl Actuator {
                     );
                 }
             };
-            only(checks, "compensation", self.compensation == Compensation::None, "compensation");
+            only(checks, "compensation", self.compensation == Compensation::NONE, "compensation");
             only(checks, "dynamics", !matches!(self.dynamics, Dynamics::FirstOrder { .. }), "a discrete actuator");
             only(checks, "command_converter", self.command_converter.is_ideal(), "a converter in the loop");
             only(checks, "force_sensor", self.force_sensor.is_ideal(), "a force sensor in the loop");

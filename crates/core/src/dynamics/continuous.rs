@@ -540,7 +540,7 @@ mod tests {
             gain: 1.1,
             delay: Delay::Constant(delay),
             dynamics: Dynamics::None,
-            compensation: Compensation::None,
+            compensation: Compensation::NONE,
             command_converter: Converter::default(),
             displacement_sensor: Converter::default(),
             force_sensor: Converter::default(),

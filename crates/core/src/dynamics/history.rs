@@ -157,11 +157,6 @@ impl History {
         self.ring[self.n_pushed.wrapping_sub(1) & self.mask].acceleration = acceleration;
     }
 
-    #[inline]
-    pub(crate) fn newest(&self) -> Motion {
-        self.back(0)
-    }
-
     /// The motion `n` steps behind the newest.
     #[inline]
     pub(crate) fn back(&self, n: usize) -> Motion {

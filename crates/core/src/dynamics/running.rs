@@ -125,6 +125,6 @@ impl VirtualTest {
             Stepping::Continuous => actuator.linear_dynamics(false)?.response(Complex::new(0.0, omega)),
             Stepping::Cr => SampledActuator::planned(actuator, self.config.rate_hz).response(omega)?,
         };
-        Some(actuator.compensation.response(omega, self.config.rate_hz) * line * dynamics)
+        Some(actuator.compensation.response(omega, self.config.rate_hz)? * line * dynamics)
     }
 }

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 
 use super::actuator::Actuator;
 use super::check::configuration;
-use super::compensator::CompensatorState;
+use super::compensator::{Running, Seen};
 use super::history::Motion;
 use super::law::Memory;
 use super::sampled_actuator::{SampledActuator, SampledActuatorState};
@@ -48,7 +48,9 @@ impl Explicit for Cr {
 struct Rig {
     plan: SampledActuator,
     state: SampledActuatorState,
-    compensator: CompensatorState,
+    compensator: Option<Box<dyn Running>>,
+    /// What was sent out last.
+    sent: f64,
     velocity: f64,
     measured: f64,
     felt: f64,
@@ -64,7 +66,8 @@ impl Rig {
         Self {
             state: plan.state(),
             plan,
-            compensator: actuator.compensation.state(rate_hz),
+            compensator: actuator.compensation.start(rate_hz),
+            sent: 0.0,
             velocity: 0.0,
             measured: 0.0,
             felt: 0.0,
@@ -75,13 +78,17 @@ impl Rig {
 
     /// One sample: target in, moved and measured, with the noise of command, displacement and force; what was sent out.
     #[inline(always)]
-    fn step(&mut self, actuator: &Actuator, target: Motion, noise: [f64; 3], rate_hz: f64) -> f64 {
-        let mut command = actuator.compensation.step(&mut self.compensator, target, rate_hz, self.measured);
+    fn step(&mut self, actuator: &Actuator, target: Motion, noise: [f64; 3]) -> f64 {
+        let mut command = match &mut self.compensator {
+            Some(compensator) => compensator.step(Seen { target, command: self.sent, measured: self.measured }),
+            None => target,
+        };
         let sent = actuator.command_converter.convert(command.displacement + noise[0]);
         if sent.abs() >= actuator.command_converter.limit {
             command.velocity = 0.0;
         }
         command.displacement = sent;
+        self.sent = sent;
         let (motion, answer) = self.plan.step(&mut self.state, command);
         self.measured = actuator.displacement_sensor.convert(motion.displacement + noise[1]);
         self.felt = actuator.force_sensor.convert(answer + noise[2]);
@@ -117,7 +124,7 @@ pub(crate) fn follow(test: &VirtualTest, target: &[Motion], noise: &Noise, bound
     let mut run = Run::sized(rigs.len(), 0, target.len(), 1);
     for (sample, target) in target.iter().enumerate() {
         for (i, (rig, actuator)) in rigs.iter_mut().zip(actuators).enumerate() {
-            let sent = rig.step(actuator, *target, noise_of(noise, i, sample), rate);
+            let sent = rig.step(actuator, *target, noise_of(noise, i, sample));
             rig.record(&mut run, i, sample, target.displacement, sent);
         }
         if !rigs.iter().all(|rig| rig.is_within(bound)) {
@@ -173,7 +180,7 @@ pub(crate) fn run(test: &VirtualTest, ground: &[f64], noise: &Noise, bound: f64)
             let target =
                 Motion { displacement: actuator.across(&x), velocity, acceleration: (velocity - rig.velocity) * rate };
             rig.velocity = velocity;
-            let sent = rig.step(actuator, target, noise_of(noise, i, sample), rate);
+            let sent = rig.step(actuator, target, noise_of(noise, i, sample));
             rig.record(&mut run, i, sample, target.displacement, sent);
             let arrived = if rig.late.is_empty() {
                 rig.felt

@@ -7,30 +7,77 @@ import re
 import struct
 import threading
 import warnings
+from collections.abc import Callable
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from rthstrack.errors import RecordingError
+from rthstrack.errors import RecordingError, printable
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rthstrack.recording.readers.contents import Contents
 
-_ENDINGS = {
-    "text": (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm", ".prn", ".out"),
-    "PEER AT2": (".at2",),
-    "MATLAB": (".mat",),
-    "MATLAB v7.3": (".mat",),
-    "HDF5": (".h5", ".hdf5", ".hdf", ".he5"),
-    "TDMS": (".tdms",),
-    "Parquet": (".parquet", ".pq"),
-    "Arrow stream": (".arrows", ".arrow"),
-    "Arrow file": (".arrow", ".feather"),
-    "NumPy npy": (".npy",),
-    "NumPy npz": (".npz",),
-}
+
+class Beginning(NamedTuple):
+    """What tells a file's format: its path, its first bytes, and whether it is HDF5, perhaps behind a user block."""
+
+    file: Path
+    head: bytes
+    is_hdf5: bool
+
+    def starts(self, *signatures: bytes) -> bool:
+        """Whether it begins with one of these."""
+        return self.head.startswith(signatures)
+
+
+class Format(NamedTuple):
+    """A file format: its name and what help calls it, its module, usual endings, and how it is recognised.
+
+    `module` has a function `reader` (path) -> Contents.
+    """
+
+    name: str
+    called: str
+    module: str
+    endings: tuple[str, ...]
+    recognises: Callable[[Beginning], bool]
+    reader: str = "read"
+
+    def read(self, file: Path) -> Contents:
+        """Everything in a file of this format."""
+        found: Contents = getattr(import_module(f"{__name__}.{self.module}"), self.reader)(file)
+        return found
+
+
+def _is_at2(b: Beginning) -> bool:
+    from rthstrack.recording.readers import at2
+
+    return at2.recognised(b.file)
+
+
+def _is_matlab(b: Beginning) -> bool:
+    return not b.is_hdf5 and (b.starts(b"MATLAB 5.0") or b.head[126:128] in (b"IM", b"MI") or _is_mat4(b.head))
+
+
+#: Every format, in the order in which they are looked for: the last is what no other is.
+FORMATS = (
+    Format("MATLAB", "MATLAB", "mat", (".mat",), _is_matlab),
+    Format("MATLAB v7.3", "MATLAB", "mat73", (".mat",), lambda b: b.starts(b"MATLAB 7")),
+    Format("HDF5", "HDF5", "hdf5", (".h5", ".hdf5", ".hdf", ".he5"), lambda b: b.is_hdf5),
+    Format("TDMS", "TDMS", "tdms", (".tdms",), lambda b: b.starts(b"TDSm")),
+    Format("Parquet", "Parquet", "parquet", (".parquet", ".pq"), lambda b: b.starts(b"PAR1")),
+    Format("Arrow stream", "Arrow", "arrow", (".arrows", ".arrow"), lambda b: b.starts(b"\xff\xff\xff\xff")),
+    Format("Arrow file", "Arrow", "arrow", (".arrow", ".feather"), lambda b: b.starts(b"ARROW1\0\0")),
+    Format("NumPy npy", "NumPy", "numpy_file", (".npy",), lambda b: b.starts(b"\x93NUMPY"), "read_npy"),
+    Format("NumPy npz", "NumPy", "numpy_file", (".npz",), lambda b: b.starts(b"PK\3\4", b"PK\5\6"), "read_npz"),
+    Format("PEER AT2", "text", "at2", (".at2",), _is_at2),
+    Format("text", "text", "text", (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm", ".prn", ".out"), lambda _: True),
+)
+_TEXT = FORMATS[-1]
+#: What they are called in help and messages: text first.
+FORMAT_NAMES = tuple(dict.fromkeys(("text", *(one.called for one in FORMATS))))
+_HDF5 = b"\x89HDF\r\n\x1a\n"
 _RECORDING_WARNINGS = threading.Lock()
 _OTHERS = (
     (b"\xd0\xcf\x11\xe0", "an old Excel or Office file; save the sheet as CSV"),
@@ -51,14 +98,14 @@ def read_contents(path: str | os.PathLike[str]) -> Contents:
     """
     file = Path(path)
     try:
-        kind, reader = _reader(file)
-        if kind == "text":
-            contents, caught = reader(file), []
+        found = _format(file)
+        if found is _TEXT:
+            contents, caught = _read_text(file), []
         else:
             # The interpreter has one list of warning filters: whoever records warnings must be alone.
             with _RECORDING_WARNINGS, warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always")
-                contents = reader(file)
+                contents = found.read(file)
     except RecordingError as error:
         raise _error(path, error) from error.__cause__
     except OSError as error:
@@ -71,32 +118,23 @@ def read_contents(path: str | os.PathLike[str]) -> Contents:
         raise _error(path, f"damaged, or not as its format demands: {_first_line(error)}") from error
     notes = _summed([*contents.notes, *(_first_line(w.message) for w in caught)])
     if not contents.series:
-        found = "; ".join(notes[:3]) or "nothing of the kind"
-        raise _error(path, f"no channels; expected vectors of numbers ({contents.format}), found: {found}")
+        said = "; ".join(notes[:3]) or "nothing of the kind"
+        raise _error(path, f"no channels; expected vectors of numbers ({contents.format}), found: {said}")
     ending = file.suffix.lower()
-    if any(ending in endings for endings in _ENDINGS.values()) and ending not in _ENDINGS[kind]:
+    if any(ending in one.endings for one in FORMATS) and ending not in found.endings:
         notes.append(f"named {file.suffix}, but the content is {contents.format}")
     return replace(
         contents,
-        series=tuple(replace(s, name=_printable(s.name), path=_printable(s.path)) for s in contents.series),
-        clocks=tuple(replace(c, name=_printable(c.name), path=_printable(c.path)) for c in contents.clocks),
-        notes=tuple(map(_printable, notes)),
+        series=tuple(replace(s, name=printable(s.name), path=printable(s.path)) for s in contents.series),
+        clocks=tuple(replace(c, name=printable(c.name), path=printable(c.path)) for c in contents.clocks),
+        notes=tuple(map(printable, notes)),
     )
 
 
 def _error(path: str | os.PathLike[str], what: object) -> RecordingError:
     """One printable line that begins with the file."""
-    line = _printable(f"{os.fspath(path)}: {what}")
+    line = printable(f"{os.fspath(path)}: {what}")
     return RecordingError(line if len(line) <= 1000 else line[:997] + "...")
-
-
-def _printable(text: str) -> str:
-    """Text from a file, which may be damaged, with control characters escaped."""
-    return (
-        text
-        if text.isprintable()
-        else "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
-    )
 
 
 def _first_line(cause: object) -> str:
@@ -121,8 +159,8 @@ def _summed(notes: list[str]) -> list[str]:
     return said
 
 
-def _reader(file: Path) -> tuple[str, Callable[[Path], Contents]]:
-    """The format that a file's first bytes show, and its reader."""
+def _format(file: Path) -> Format:
+    """The format that a file's first bytes show."""
     if not file.exists():
         raise RecordingError("no such file")
     if file.is_dir():
@@ -133,68 +171,31 @@ def _reader(file: Path) -> tuple[str, Callable[[Path], Contents]]:
         head = opened.read(512)
         if not head:
             raise RecordingError("the file is empty")
-        signed_later = _hdf5_behind_a_block(opened.seek, opened.read)
+        is_hdf5 = head.startswith(_HDF5) or _hdf5_behind_a_block(opened.seek, opened.read)
     for magic, what in _OTHERS:
         if head.startswith(magic):
-            raise RecordingError(f"{what}; expected text, MATLAB, HDF5, TDMS, Parquet, Arrow or NumPy")
-    if head.startswith(b"\x89HDF\r\n\x1a\n") or signed_later:
-        if head.startswith(b"MATLAB 7"):
-            from rthstrack.recording.readers import mat73
+            raise RecordingError(f"{what}; expected {', '.join(FORMAT_NAMES[:-1])} or {FORMAT_NAMES[-1]}")
+    beginning = Beginning(file, head, is_hdf5)
+    return next(one for one in FORMATS if one.recognises(beginning))
 
-            return "MATLAB v7.3", mat73.read
-        from rthstrack.recording.readers import hdf5
 
-        return "HDF5", hdf5.read
-    if head.startswith(b"MATLAB 5.0") or head[126:128] in (b"IM", b"MI") or _is_mat4(head):
-        from rthstrack.recording.readers import mat
-
-        return "MATLAB", mat.read
-    if head.startswith(b"MATLAB 7"):
-        raise RecordingError("a MATLAB v7.3 file without the HDF5 content behind its header; it is truncated")
-    if head.startswith(b"TDSm"):
-        from rthstrack.recording.readers import tdms
-
-        return "TDMS", tdms.read
-    if head.startswith(b"PAR1"):
-        from rthstrack.recording.readers import parquet
-
-        return "Parquet", parquet.read
-    if head.startswith((b"ARROW1\0\0", b"\xff\xff\xff\xff")):
-        from rthstrack.recording.readers import arrow
-
-        return "Arrow file" if head.startswith(b"ARROW1") else "Arrow stream", arrow.read
-    if head.startswith((b"PK\x03\x04", b"PK\x05\x06")):
-        from rthstrack.recording.readers import numpy_file
-
-        return "NumPy npz", numpy_file.read_npz
-    if head.startswith(b"\x93NUMPY"):
-        from rthstrack.recording.readers import numpy_file
-
-        return "NumPy npy", numpy_file.read_npy
-    from rthstrack.recording.readers import at2, text
-
-    if at2.recognised(file):
-        return "PEER AT2", at2.read
-    named = next((k for k, endings in _ENDINGS.items() if k != "text" and file.suffix.lower() in endings), None)
-    if named is None:
-        return "text", text.read
-
-    def read_misnamed(path: Path) -> Contents:
-        try:
-            return text.read(path)
-        except RecordingError as error:
-            raise RecordingError(
-                f"named {path.suffix}, but it does not begin as {named} does, and as text: {error}"
-            ) from None
-
-    return "text", read_misnamed
+def _read_text(file: Path) -> Contents:
+    """What no signature tells is text; a name that promises something else is told where it is none."""
+    named = next((one for one in FORMATS if one is not _TEXT and file.suffix.lower() in one.endings), None)
+    try:
+        return _TEXT.read(file)
+    except RecordingError as error:
+        if named is None:
+            raise
+        what = f"named {file.suffix}, but it does not begin as {named.name} does, and as text: {error}"
+        raise RecordingError(what) from None
 
 
 def _hdf5_behind_a_block(seek: Callable[[int], int], read: Callable[[int], bytes]) -> bool:
     """HDF5's signature may stand behind a user block of 512, 1024, 2048, ... bytes."""
     for offset in (512, 1024, 2048, 4096, 8192):
         seek(offset)
-        if read(8) == b"\x89HDF\r\n\x1a\n":
+        if read(8) == _HDF5:
             return True
     return False
 

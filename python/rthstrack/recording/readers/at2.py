@@ -11,6 +11,7 @@ import numpy as np
 from rthstrack.errors import RecordingError
 from rthstrack.recording.readers.arrays import tidy
 from rthstrack.recording.readers.contents import Contents, RateStatement, Series
+from rthstrack.units import size_in_si
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -21,16 +22,6 @@ STANDARD_GRAVITY_M_S2 = 9.80665
 
 # The header has four lines; a file may have one or two of its owner's before them.
 _HEADER_LINES = 10
-#: How many m/s2 are in one of each.
-ACCELERATION_UNITS = {
-    "g": STANDARD_GRAVITY_M_S2,
-    "gal": 1e-2,
-    "cm/s2": 1e-2,
-    "m/s2": 1.0,
-    "mm/s2": 1e-3,
-    "in/s2": 0.0254,
-    "ft/s2": 0.3048,
-}
 _NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eEdD][-+]?\d+)?"
 _SIZES = re.compile(r"\bNPTS\b.*\bDT\b", re.IGNORECASE)
 _QUANTITY = re.compile(r"\bUNITS?\b|\b(?:ACCEL|VELOC|DISPL)", re.IGNORECASE)
@@ -46,8 +37,8 @@ def acceleration_unit(text: str) -> tuple[str, float] | None:
     Spellings such as CM/SEC/SEC, cm/sec^2, m/s**2, m/s² and [m/s2] are understood.
     """
     plain = re.sub(r"[\s\[\]()^*]", "", text).lower().replace("²", "2").replace("sec", "s").replace("gals", "gal")
-    plain = re.sub(r"/s/s$", "/s2", plain)
-    return (plain, ACCELERATION_UNITS[plain]) if plain in ACCELERATION_UNITS else None
+    size = size_in_si(text, "acceleration")
+    return (re.sub(r"/s/s$", "/s2", plain), size) if size else None
 
 
 def recognised(path: Path) -> bool:

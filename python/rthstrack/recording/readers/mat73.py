@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
+from rthstrack.errors import RecordingError
 from rthstrack.recording.readers.hdf5 import check_size
 from rthstrack.recording.readers.matlab import Cell, Opaque, Struct, contents
 
@@ -21,6 +22,8 @@ _DEEPEST = 32
 
 def read(path: Path) -> Contents:
     """Reads a MATLAB v7.3 file."""
+    if not h5py.is_hdf5(path):
+        raise RecordingError("a MATLAB v7.3 file without the HDF5 content behind its header; it is truncated")
     with h5py.File(path, "r") as file:
         names = [name for name in file if not name.startswith("#")]
         return contents("MATLAB v7.3", {name: _node(file, file.get(name), 0) for name in names})

@@ -12,9 +12,9 @@ from rthstrack._core import read_text as core_read_text
 from rthstrack.errors import RecordingError
 from rthstrack.recording.readers.arrays import tidy
 from rthstrack.recording.readers.contents import Clock, Contents, RateStatement, Series
+from rthstrack.units import size_in_si
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -31,23 +31,19 @@ _STEP_KEY = (
     r"(?:sampl(?:e|es|ing)|scan)[ _-]*(?:interval|period|step)|time[ _-]*(?:step|interval|increment)"
     r"|abtastintervall|delta[ _]?[tx]|dt"
 )
-_HERTZ = {"hz": 1.0, "khz": 1e3, "s/s": 1.0, "ks/s": 1e3, "sps": 1.0, "1/s": 1.0, "samples/s": 1.0, "samples/sec": 1.0}
-_SECOND = {"s": 1.0, "sec": 1.0, "secs": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3, "us": 1e-6}
-_SECOND["µs"] = 1e-6
 
 
-def _statement(key: str, units: Iterable[str], mark: str) -> re.Pattern[str]:
+def _statement(key: str, mark: str) -> re.Pattern[str]:
     """The words, perhaps a unit in brackets, a separator, a number that is no date or time of day, perhaps a unit.
 
     A word behind the number that is followed by more is the next key, and no unit; in the next cell only a known unit
     is one.
     """
     number = _NUMBERS[mark] if mark == "," else f"{_GROUPED}|{_NUMBERS[mark]}"
-    known = "|".join(map(re.escape, units))
     return re.compile(
         rf"(?<![a-zäöüé_])(?P<key>{key})\s*(?:[\[(]\s*(?P<unit>[^\])]{{1,12}})[\])])?\s*[:=,;\t ]\s*[\"']?\s*"
         rf"(?P<value>{number})(?![\d]|[.:/-]\d)(?:[ ]*(?P<behind>[a-zµ1][a-zµ/1]*)(?!\s*[:=\w])"
-        rf"|\s*[,;\t]\s*(?P<cell>{known})(?![\w/]))?",
+        r"|(?=\s*[,;\t]\s*(?P<cell>[a-zµ1][a-zµ/1]*)(?![\w/])))?",
         re.IGNORECASE,
     )
 
@@ -100,15 +96,15 @@ def seconds_since_first(stamps: NDArray[np.int64], *, dated: bool) -> NDArray[np
 def rate_statements(preamble: list[str], notes: list[str], *, decimal_comma: bool = False) -> list[RateStatement]:
     """Sampling rates and intervals stated in lines of text; several values on a line hold for one channel each."""
     mark = "," if decimal_comma else "."
-    patterns = ((_statement(_RATE_KEY, _HERTZ, mark), _HERTZ), (_statement(_STEP_KEY, _SECOND, mark), _SECOND))
+    patterns = ((_statement(_RATE_KEY, mark), "frequency"), (_statement(_STEP_KEY, mark), "time"))
     over_time = not any(re.match(r"x_dimension\b(?!.*time)", line, re.IGNORECASE) for line in preamble)
     statements: list[RateStatement] = []
-    for pattern, units in patterns:
+    for pattern, measures in patterns:
         for line in preamble:
             for found in pattern.finditer(line):
                 key = found["key"].strip()
-                unit = (found["unit"] or found["behind"] or found["cell"] or "").strip().lower()
-                factor = units.get(unit) if unit else 1.0
+                unit, cell = (found["unit"] or found["behind"] or "").strip(), found["cell"]
+                factor = size_in_si(unit, measures) if unit else size_in_si(cell, measures) or 1.0
                 # A unit of another kind (mm/s) makes it a statement of something else.
                 if factor is None or (key.lower().startswith("delta_x") and not over_time):
                     continue
@@ -119,7 +115,7 @@ def rate_statements(preamble: list[str], notes: list[str], *, decimal_comma: boo
                     if not (math.isfinite(value) and value > 0):
                         notes.append(f"header '{key}' states {text.strip()}, which was not used")
                         continue
-                    rate = value * factor if units is _HERTZ else 1 / (value * factor)
+                    rate = value * factor if measures == "frequency" else 1 / (value * factor)
                     statements.append(RateStatement(f"header '{key}'", tidy(rate), str(at) if len(texts) > 1 else None))
     return _unique(statements)
 
