@@ -13,20 +13,24 @@ from typing import Any
 
 import numpy as np
 
+from rthstrack._core import alarm_settings
+
 HEALTH = {
     "received": 0, "lost": 0, "repeated": 0, "reordered": 0, "malformed": 0, "refused": 0, "filled": 0, "restarts": 0,
-    "readings": 0, "pace_hz": None, "age_s": None, "log": None, "log_dropped": 0,
+    "readings": 0, "pace_hz": None, "age_s": None, "log": None, "log_code": None, "log_dropped": 0,
 }  # fmt: skip
 MONITOR = {
     "rate_hz", "window_s", "update_hz", "band_hz", "window", "detrend", "estimator", "data_decimation",
     "frequency_decimation", "max_delay_s", "expected_delay_s", "minimum_amplitude", "n_actuators",
 }  # fmt: skip
 SOURCE = {"kind", "address", "senders", "layout", "fill_samples", "check_pace", "path"}
-ALARMS = {
-    "limit_delay_s", "limit_amplitude", "critical_delay_s", "critical_fraction", "limit_lost", "silence_s",
-    "hysteresis", "minimum_duration_s", "latch",
-}  # fmt: skip
+ALARMS = {setting["name"] for setting in alarm_settings() if setting["option"]}
 OUTPUTS = {"readings_udp", "readings_file", "alarm_udp", "control", "log", "page", "names", "units"}
+
+
+def event(code: str, time_s: float | None, text: str, **values: Any) -> dict[str, Any]:
+    """An event as the compiled part tells it."""
+    return {"time_s": time_s, "code": code, "values": values, "kept_back": 0, "text": text}
 
 
 class FakeLive:
@@ -43,6 +47,7 @@ class FakeLive:
     alarm_name = "delay"
     #: Why readings are not valid.
     reason: str | None = None
+    reason_code: str | None = None
     events: tuple[dict[str, Any], ...] = ()
     totals: dict[str, int] = {}  # noqa: RUF012
 
@@ -58,7 +63,7 @@ class FakeLive:
         self.begin_s: float | None = None
         self.stop_s: float | None = None
         self.sample = self.reading = 0
-        self.log: list[str | None] = []
+        self.log: list[tuple[str | None, str | None]] = []
         self.resets = 0
         self.ended = threading.Event()
 
@@ -90,7 +95,7 @@ class FakeLive:
 
     def reset(self) -> None:
         self.resets += 1
-        self.events = (*self.events, {"time_s": 0.0, "text": f"alarms were reset ({self.resets})"})
+        self.events = (*self.events, event("alarms_reset", 0.0, f"alarms were reset ({self.resets})"))
 
     def summary(self) -> dict[str, int]:
         keys = ("received", "lost", "repeated", "reordered", "malformed", "readings", "alarms")
@@ -121,15 +126,17 @@ class FakeLive:
             "index": 0, "time_s": now_s, "centre_s": now_s - 2, "actuator": 0, "amplitude": 1.02, "delay_s": 0.0123,
             "phase_rad": -0.1, "equivalent_frequency_hz": 2.5, "amplitude_interval": [1.01, 1.03],
             "delay_interval_s": [0.0121, 0.0125], "valid": self.reason is None,
-            "reason": self.reason,
+            "reason": self.reason, "reason_code": self.reason_code, "reason_values": None,
         }  # fmt: skip
-        raised = [{"time_s": self.alarm_after_s, "text": alarm["text"]}] if self.alarmed() else []
-        log = next(iter(self.log[-1:]), None)
+        of = {"alarm": alarm["name"], "actuator": alarm["actuator"]}
+        raised = [event("alarm_raised", self.alarm_after_s, alarm["text"], **of)] if self.alarmed() else []
+        state, why = next(iter(self.log[-1:]), (None, None))
+        log = {"log": state if why is None else f"{state}: {why}", "log_code": state}
         return json.dumps(
             {
                 "time_s": now_s,
                 "state": "running",
-                "health": HEALTH | {"received": int(now_s * self.rate_hz), "pace_hz": self.rate_hz, "log": log},
+                "health": HEALTH | {"received": int(now_s * self.rate_hz), "pace_hz": self.rate_hz} | log,
                 "readings": [reading, *[None] * (self.n_actuators - 1)],
                 "alarms": [alarm],
                 "events": [*self.events, *raised],
@@ -169,8 +176,8 @@ class FakeLive:
             "alarms": ["delay"] * n,
         }
 
-    def note_log(self, state: str | None) -> None:
-        self.log.append(state)
+    def note_log(self, state: str | None, why: str | None = None) -> None:
+        self.log.append((state, why))
 
 
 if __name__ == "__main__":

@@ -27,6 +27,14 @@ from rthstrack.live.page import Page, Source
 RATE_HZ, UPDATE_HZ, WINDOW_S = 256.0, 64.0, 4.0
 PER_READING = int(RATE_HZ / UPDATE_HZ)
 LIMIT_DELAY_S, LIMIT_AMPLITUDE = 0.015, 0.1
+ALARM_KINDS = [
+    {"name": "delay", "title": "Delay", "quantity": "delay", "limit": "delay_s"},
+    {"name": "amplitude", "title": "Amplitude", "quantity": "amplitude", "limit": "amplitude"},
+    {"name": "critical_delay", "title": "Critical delay", "quantity": "delay", "limit": "critical_delay_s"},
+    {"name": "lost", "title": "Lost samples", "quantity": "lost", "limit": "lost"},
+    {"name": "silence", "title": "Silence", "quantity": None, "limit": "silence_s"},
+    {"name": "unjudged", "title": "Not judged", "quantity": None, "limit": "unjudged_s"},
+]
 
 
 class MadeUp:
@@ -40,7 +48,7 @@ class MadeUp:
         self.reason: list[str | None] = [None] * n_actuators
         self.silent = self.waiting = False
         self.units: list[str | None] | None = None
-        self.health = {"lost": 0, "malformed": 0, "log": "writing"}
+        self.health = {"lost": 0, "malformed": 0, "log": "writing", "log_code": "writing"}
         self._alarms: dict[tuple[str, int], dict[str, Any]] = {}
         self._events: list[tuple[int, dict[str, Any]]] = []
         self._readings: list[list[Any]] = []
@@ -78,16 +86,21 @@ class MadeUp:
                 "names": self.names,
                 "source": "udp 127.0.0.1:5005",
                 "limits": limits,
+                "alarm_kinds": ALARM_KINDS,
             }
             | ({} if self.units is None else {"units": self.units})
         )
+
+    @staticmethod
+    def _event(code: str, time_s: float, text: str) -> dict[str, Any]:
+        return {"time_s": time_s, "code": code, "values": {}, "kept_back": 0, "text": text}
 
     def target(self, t: Any) -> Any:
         return 12 * np.sin(5.1 * t) + 5 * np.sin(14.3 * t + 1) * np.sin(0.31 * t)
 
     def event(self, text: str) -> None:
         with self._lock:
-            self._events.append((self._n, {"time_s": self._n / self.rate_hz, "text": text}))
+            self._events.append((self._n, self._event("samples_lost", self._n / self.rate_hz, text)))
 
     def reset(self) -> None:
         with self._lock:
@@ -132,7 +145,7 @@ class MadeUp:
                     "limit": limit,
                     "text": text,
                 }
-                self._events.append((self._n, {"time_s": t, "text": f"raised: {text}"}))
+                self._events.append((self._n, self._event("alarm_raised", t, f"raised: {text}")))
         elif known is not None:
             known["active"] = False
             if not known["latched"]:
@@ -169,6 +182,7 @@ class MadeUp:
                     "pace_hz": self.rate_hz * 0.9996,
                     "age_s": time.monotonic() - self._started - self._lost_s - self._n / self.rate_hz + self._lost_s,
                     "log": None,
+                    "log_code": None,
                     "log_dropped": 0,
                 }
                 | self.health,
@@ -330,7 +344,7 @@ def test_the_page_says_what_the_monitor_says(serve: Callable[..., Page], opened:
     source = MadeUp(2, names=["north", "south"])
     source.fill(10)
     source.reason[1] = "not determined: too little motion to judge by"
-    source.health |= {"lost": 1234, "log": "stopped: No space left on device"}
+    source.health |= {"lost": 1234, "log": "stopped: No space left on device", "log_code": "stopped"}
     source.event("sender restarted at counter 0")
     page = opened(serve(source))
     page.until_state("running")

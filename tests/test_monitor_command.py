@@ -18,7 +18,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from fake_live import FakeLive
+from fake_live import FakeLive, event
 from rthstrack import _core
 from rthstrack.cli import addresses, main
 from rthstrack.errors import SettingError
@@ -420,7 +420,7 @@ def test_an_address_that_others_reach_is_told_unless_senders_are_listed(
 
 def test_events_and_alarms_are_a_line_each_and_once(capsys: pytest.CaptureFixture[str], fake: type[FakeLive]) -> None:
     fake.ends_after_s, fake.alarm_after_s = 0.6, 0.2
-    fake.events = ({"time_s": 0.1, "text": "12 samples lost, the window starts anew"},)
+    fake.events = (event("samples_lost", 0.1, "12 samples lost, the window starts anew", samples=12),)
     status, _, err = run(capsys, *UDP)
     assert status == 0
     assert err[1:] == [
@@ -431,7 +431,7 @@ def test_events_and_alarms_are_a_line_each_and_once(capsys: pytest.CaptureFixtur
 
 def test_quiet_leaves_only_alarms(capsys: pytest.CaptureFixture[str], fake: type[FakeLive]) -> None:
     fake.ends_after_s, fake.alarm_after_s = 0.3, 0.1
-    fake.events = ({"time_s": 0.1, "text": "something"},)
+    fake.events = (event("samples_again", 0.1, "something"),)
     _, _, err = run(capsys, *UDP, "--quiet")
     assert len(err) == 1
     assert "ALARM" in err[0]
@@ -474,8 +474,10 @@ def test_an_alarm_that_came_and_went_between_two_looks_ends_it_too(
     capsys: pytest.CaptureFixture[str], fake: type[FakeLive]
 ) -> None:
     fake.events = (
-        {"time_s": 0.1, "text": "advisory: actuator 0: delay of 21.000 ms, limit 20.000 ms either way"},
-        {"time_s": 0.2, "text": "advisory: actuator 0: alarm 'delay' is over"},
+        event(
+            "alarm_raised", 0.1, "advisory: actuator 0: delay of 21.000 ms, limit 20.000 ms", alarm="delay", actuator=0
+        ),
+        event("alarm_over", 0.2, "advisory: actuator 0: alarm 'delay' is over", alarm="delay", actuator=0),
     )
     assert run(capsys, *UDP, "--exit-on-alarm")[0] == 3
     fake.events = fake.events[1:]
@@ -651,6 +653,7 @@ def a_status(n_actuators: int, **changes: Any) -> dict[str, Any]:
     reading = {
         "time_s": 9.0, "amplitude": 1.02, "delay_s": 0.0123, "equivalent_frequency_hz": 2.5,
         "amplitude_interval": [1.01, 1.03], "delay_interval_s": [0.0121, 0.0125], "valid": True, "reason": None,
+        "reason_code": None, "reason_values": None,
     }  # fmt: skip
     return {
         "time_s": 9.0, "state": "running", "health": {"received": 7, "lost": 0, "pace_hz": 512.0, "log": None},
@@ -698,17 +701,18 @@ def test_the_view_tells_which_actuator_has_long_not_been_judged() -> None:
     from rthstrack.live.view import Judged
 
     judged = Judged(3, longest_s=6.0)
-    ambiguous = "not determined: ambiguous, delays of 1.5 and -98.5 ms fit equally well; lower max_delay_s below half"
+    # The words of a reason tell people; the program goes by the code.
+    ambiguous = {"reason": "in words", "reason_code": "ambiguous", "reason_values": [0.0015, -0.0985]}
     assert judged.missing_s(a_status(3) | {"time_s": None}) == {}
     for now_s in range(20):
         status = a_status(3, time_s=float(now_s)) | {"time_s": float(now_s)}
-        status["readings"][1] |= {"valid": now_s < 3, "reason": None if now_s < 3 else ambiguous}
+        status["readings"][1] |= {"valid": True} if now_s < 3 else {"valid": False} | ambiguous
         # One that rests has nothing to be judged by.
-        status["readings"][2] |= {"valid": False, "reason": "not determined: too little motion to judge by"}
+        status["readings"][2] |= {"valid": False, "reason": "in words", "reason_code": "still"}
         missing = judged.missing_s(status)
         assert missing == ({1: now_s - 2.0} if now_s > 8 else {})
-    lines = drawn(status, ("north", "south", "west"), unjudged_s=missing).splitlines()
-    said = "not judged for 17 s: one tone, 1.5 or -98.5 ms: choose with --expected-delay S"
+    lines = drawn(status, ("north", "south", "west"), (170, 50), unjudged_s=missing).splitlines()
+    said = "not judged for 17 s: one tone, 1.5000 or -98.5000 ms: choose with --expected-delay S"
     assert said in next(line for line in lines if line.startswith("south"))
     assert "not judged" not in next(line for line in lines if line.startswith("west"))
     # Samples come, readings do not.
@@ -724,11 +728,11 @@ ESCAPES = "\x1b]0;owned\x07\x1b[2J\x9b31m\r\n"
 def test_what_a_sender_or_a_layout_says_commands_no_terminal(
     capsys: pytest.CaptureFixture[str], fake: type[FakeLive]
 ) -> None:
-    fake.events = ({"time_s": 0.1, "text": f"the line '{ESCAPES}' is no sample"},)
+    fake.events = (event("malformed_line", 0.1, f"the line '{ESCAPES}' is no sample", line=ESCAPES),)
     _, _, err = run(capsys, *UDP)
     assert err[-1] == "rthstrack: at 0.10 s: the line '\\x1b]0;owned\\x07\\x1b[2J\\x9b31m\\r\\n' is no sample"
     status = a_status(1, valid=False, reason=ESCAPES)
-    status["health"]["log"] = ESCAPES
+    status["health"] |= {"log": ESCAPES, "log_code": "stopped"}
     status["alarms"] = [an_alarm(0) | {"text": f"advisory: {ESCAPES}"}]
     text = drawn(status, (ESCAPES,), events=[ESCAPES])
     assert text.count("\\x1b]0;owned") >= 4
@@ -762,7 +766,9 @@ def test_the_view_tells_what_is_not_valid_not_there_and_over_with_the_names_of_t
         ("amplitude", "delay_s", "equivalent_frequency_hz", "amplitude_interval", "delay_interval_s")
     )
     reading = nothing | {"actuator": 1, "valid": False, "reason": "the target moves less than minimum_amplitude"}
+    reading |= {"reason_code": "still", "reason_values": None}
     health = {"received": 7, "lost": 0, "malformed": 3, "pace_hz": None, "log": "stopped: disk full", "log_dropped": 0}
+    health["log_code"] = "stopped"
     status = {
         "time_s": None, "state": "silent", "health": health, "readings": [None, reading],
         "alarms": [alarm, silent, idle], "events": [],

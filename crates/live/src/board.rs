@@ -6,6 +6,7 @@ use rthstrack::{Monitor, Reading};
 use rtrb::Consumer;
 
 use crate::alarm::Alarm;
+use crate::event::{Event, Happening};
 use crate::outlets::Item;
 
 /// Readings kept of each actuator, all of the latest and some of those before.
@@ -17,13 +18,6 @@ const HISTORY_S: f64 = 1800.0;
 /// Of the scope.
 const SCOPE_S: f64 = 10.0;
 const MAX_EVENTS: usize = 256;
-
-/// A time of the stream and what happened.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Event {
-    pub(crate) time_s: f64,
-    pub(crate) text: String,
-}
 
 /// Each thing kept bears the version at which it came, so that any number of readers each find what is new to them.
 #[derive(Debug)]
@@ -65,17 +59,22 @@ impl Board {
     }
 
     /// Takes what has come.
-    pub(crate) fn drain(&mut self, items: &mut Consumer<Item>, rows: Option<&mut Consumer<f64>>, remarks: Vec<String>) {
+    pub(crate) fn drain(
+        &mut self,
+        items: &mut Consumer<Item>,
+        rows: Option<&mut Consumer<f64>>,
+        remarks: Vec<Happening>,
+    ) {
         self.version += 1;
         while let Ok(item) = items.pop() {
             match item {
                 Item::Reading(reading) => self.add(reading),
                 Item::Alarm(number, alarm) => self.alarms[number] = alarm,
-                Item::Event(time_s, text) => self.remember(Event { time_s, text }),
+                Item::Event(event) => self.remember(event),
             }
         }
         let time_s = self.latest.iter().flatten().map(|r| r.time_s).fold(0.0, f64::max);
-        remarks.into_iter().for_each(|text| self.remember(Event { time_s, text }));
+        remarks.into_iter().for_each(|what| self.remember(Event { time_s, what, kept_back: 0 }));
         if let Some(rows) = rows {
             self.scope.drain(rows, self.version);
         }
@@ -233,7 +232,8 @@ mod tests {
         let mut send = |board: &mut Board, time_s: f64| {
             producer.push(Item::Reading(reading(0, time_s, 1.0, 0.0))).unwrap();
             producer.push(Item::Reading(reading(1, time_s, 1.0, 0.0))).unwrap();
-            producer.push(Item::Event(time_s, format!("at {time_s}"))).unwrap();
+            let what = Happening::Silent { limit_s: time_s };
+            producer.push(Item::Event(Event { time_s, what, kept_back: 0 })).unwrap();
             board.drain(&mut consumer, None, Vec::new());
             board.version
         };

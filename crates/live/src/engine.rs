@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use rthstrack::{Monitor, MonitorState, Reading, Reason};
 
-use crate::alarm::{Alarm, AlarmConfig, Alarms, Change};
+use crate::alarm::{Alarm, AlarmConfig, Alarms, Change, Observed};
+use crate::event::{Event, Happening, printable};
 use crate::pace::{Pace, Verdict};
 use crate::sequence::{Place, Sequence, Tally};
 
@@ -61,7 +62,7 @@ pub trait Outlet {
     fn standing(&mut self, number: usize, alarm: &Alarm);
     /// A reading whose like are all out, and which the alarms have judged: for the log. `raised` is the set of alarms of its
     /// actuator and of the stream.
-    fn judged(&mut self, reading: &Reading, totals: &Totals, raised: u8);
+    fn judged(&mut self, reading: &Reading, totals: &Totals, raised: u32);
     /// A sample went into the window.
     fn sample(&mut self, sample: &Sample<'_>);
     /// One more evaluated (decimated) sample of each actuator stands at the end of the window, at this time.
@@ -69,7 +70,7 @@ pub trait Outlet {
     /// The window starts anew: what was evaluated before does not go on.
     fn restarted(&mut self);
     /// Something the user should know.
-    fn event(&mut self, time_s: f64, text: String);
+    fn event(&mut self, event: Event);
 }
 
 /// What the engine needs to know.
@@ -204,9 +205,9 @@ impl Engine {
     }
 
     /// Tells something, unless too much has been told this second.
-    pub fn tell(&mut self, now_s: f64, text: String, out: &mut impl Outlet) {
+    pub fn tell(&mut self, now_s: f64, what: Happening, out: &mut impl Outlet) {
         let time_s = self.time_at(now_s);
-        self.speech.tell(now_s, time_s, text, out);
+        self.speech.tell(now_s, time_s, what, out);
     }
 
     /// A sample with its counter (`None` where the sender counts nothing) came at this time of a monotonic clock.
@@ -248,17 +249,17 @@ impl Engine {
                 self.index = self.index.saturating_add(n);
                 self.missing.add(self.index, n);
                 self.restart(out);
-                self.tell(now_s, format!("{n} samples lost: the window starts anew"), out);
+                self.tell(now_s, Happening::SamplesLost { samples: n }, out);
             }
             Place::Restarted => {
                 // Time goes on while nothing comes.
                 self.index = self.index.saturating_add(((elapsed_s * rate_hz) as u64).saturating_sub(1));
                 self.restart(out);
-                let why = match counter {
-                    Some(_) => format!("the counter started anew at {shown}"),
-                    None => format!("nothing came for {elapsed_s:.1} s"),
+                let what = match counter {
+                    Some(counter) => Happening::CounterRestarted { counter },
+                    None => Happening::Paused { pause_s: elapsed_s },
                 };
-                self.tell(now_s, format!("{why}: the window starts anew"), out);
+                self.tell(now_s, what, out);
             }
             Place::Next | Place::Dropped => {}
         }
@@ -267,7 +268,8 @@ impl Engine {
         let lost = self.missing.at(self.index - 1);
         if let Some(lost) = lost {
             let time_s = self.time_s();
-            self.alarmed(out, |alarms, tell| alarms.count(time_s, lost, tell));
+            let observed = Observed { lost: Some(lost), ..Observed::default() };
+            self.alarmed(out, |alarms, tell| alarms.observe(None, time_s, &observed, tell));
         }
         if counter.is_some() {
             match self.pace.arrived(now_s, self.index) {
@@ -289,17 +291,18 @@ impl Engine {
             let judged = std::mem::take(&mut self.judged);
             self.alarmed(out, |alarms, tell| {
                 for (actuator, (_, judged_s)) in judged.iter().enumerate() {
-                    alarms.unjudged(actuator, time_s, time_s - judged_s, &mut *tell);
+                    let observed = Observed { unjudged_s: Some(time_s - judged_s), ..Observed::default() };
+                    alarms.observe(Some(actuator), time_s, &observed, &mut *tell);
                 }
             });
             self.judged = judged;
         } else {
             if !self.silent {
                 self.silent = true;
-                self.tell(now_s, format!("silent: no sample for {:.1} s", self.silence_s), out);
+                self.tell(now_s, Happening::Silent { limit_s: self.silence_s }, out);
             }
             let time_s = self.time_at(now_s);
-            self.alarmed(out, |alarms, tell| alarms.wait(time_s, silent_s, tell));
+            self.waited(time_s, silent_s, out);
         }
     }
 
@@ -307,11 +310,8 @@ impl Engine {
     pub fn reset(&mut self, now_s: f64, out: &mut impl Outlet) {
         let time_s = self.time_at(now_s);
         self.alarmed(out, |alarms, tell| alarms.reset(time_s, tell));
-        let text = match self.alarms.all().iter().filter(|a| a.active).count() {
-            0 => "alarms reset".to_owned(),
-            n => format!("alarms reset; {n} still over the limit"),
-        };
-        self.tell(now_s, text, out);
+        let still_active = self.alarms.all().iter().filter(|a| a.active).count();
+        self.tell(now_s, Happening::AlarmsReset { still_active }, out);
     }
 
     /// Time of the stream now, when nothing has come since the newest sample.
@@ -325,8 +325,8 @@ impl Engine {
             self.silent = false;
             let silent_s = now_s - self.arrived_s;
             let time_s = self.time_at(now_s);
-            self.alarmed(out, |alarms, tell| alarms.wait(time_s, 0.0, tell));
-            self.tell(now_s, format!("samples again, after {silent_s:.1} s"), out);
+            self.waited(time_s, 0.0, out);
+            self.tell(now_s, Happening::SamplesAgain { silent_s }, out);
         }
         self.arrived_s = now_s;
     }
@@ -397,11 +397,12 @@ impl Engine {
                 if is != *was {
                     *was = is;
                     let reason = reading.tracking.reason.filter(Reason::is_undetermined);
-                    let text = match reason {
-                        Some(reason) if !still => format!("actuator {}: {reason}", reading.actuator),
-                        _ => format!("actuator {}: determined again", reading.actuator),
+                    let actuator = reading.actuator;
+                    let what = match reason {
+                        Some(reason) if !still => Happening::Undetermined { actuator, reason },
+                        _ => Happening::Determined { actuator },
                     };
-                    self.speech.tell(self.arrived_s, reading.time_s, text, out);
+                    self.speech.tell(self.arrived_s, reading.time_s, what, out);
                 }
             }
             for (number, alarm) in self.alarms.all().iter().enumerate().filter(|(_, a)| a.actuator.is_some()) {
@@ -417,6 +418,12 @@ impl Engine {
         out.sample(&sample);
     }
 
+    /// Nothing has come for so long.
+    fn waited(&mut self, time_s: f64, silent_s: f64, out: &mut impl Outlet) {
+        let observed = Observed { silent_s: Some(silent_s), ..Observed::default() };
+        self.alarmed(out, |alarms, tell| alarms.observe(None, time_s, &observed, tell));
+    }
+
     /// Runs the alarms, and tells what has changed.
     fn alarmed(&mut self, out: &mut impl Outlet, compare: impl FnOnce(&mut Alarms, &mut dyn FnMut(Change))) {
         compare(&mut self.alarms, &mut |change| {
@@ -430,16 +437,18 @@ impl Engine {
     }
 
     fn contradicted(&mut self, now_s: f64, out: &mut impl Outlet) {
-        let (pace, rate) = (self.pace.measured_hz(), self.monitor.config().rate_hz);
+        let (pace_hz, rate_hz) = (self.pace.measured_hz(), self.monitor.config().rate_hz);
         if !self.check_pace || self.pace_told {
             return;
         }
         self.pace_told = true;
-        let told = format!("the counter advances by {pace:.0} a second but --rate says {rate}");
         if now_s - self.first_s.unwrap_or(now_s) <= PACE_TRIAL_S {
-            self.fail(format!("{told}: give the sender's true rate, or --any-pace for a replay at another speed"));
+            self.fail(format!(
+                "the counter advances by {pace_hz:.0} a second but --rate says {rate_hz}: give the sender's true rate, or \
+                 --any-pace for a replay at another speed"
+            ));
         } else {
-            self.tell(now_s, format!("{told}: time and delay are scaled by that"), out);
+            self.tell(now_s, Happening::PaceContradicts { pace_hz, rate_hz }, out);
         }
     }
 
@@ -449,11 +458,8 @@ impl Engine {
             return;
         }
         self.pace_told = true;
-        let (pace, rate) = (self.pace.long_hz(), self.monitor.config().rate_hz);
-        let told = format!(
-            "the counter advances by {pace:.1} a second but --rate says {rate}: time and delay are scaled by that"
-        );
-        self.tell(now_s, told, out);
+        let (pace_hz, rate_hz) = (self.pace.long_hz(), self.monitor.config().rate_hz);
+        self.tell(now_s, Happening::PaceOff { pace_hz, rate_hz }, out);
     }
 }
 
@@ -466,11 +472,6 @@ fn tell_standing(told: &mut [(bool, bool)], number: usize, alarm: &Alarm, out: &
     }
 }
 
-/// What a sender or a file has put into a text does not reach a terminal as commands.
-fn printable(text: String) -> String {
-    if text.contains(char::is_control) { text.replace(char::is_control, "\u{fffd}") } else { text }
-}
-
 /// Events, at most so many a second.
 #[derive(Debug, Default)]
 struct Speech {
@@ -480,8 +481,7 @@ struct Speech {
 }
 
 impl Speech {
-    fn tell(&mut self, now_s: f64, time_s: f64, text: String, out: &mut impl Outlet) {
-        let mut text = printable(text);
+    fn tell(&mut self, now_s: f64, time_s: f64, what: Happening, out: &mut impl Outlet) {
         if now_s - self.second >= 1.0 {
             (self.second, self.told) = (now_s, 0);
         }
@@ -490,15 +490,12 @@ impl Speech {
             return;
         }
         self.told += 1;
-        if self.kept_back > 0 {
-            text = format!("{text} (before it {} more events, not shown)", std::mem::take(&mut self.kept_back));
-        }
-        out.event(time_s, text);
+        out.event(Event { time_s, what, kept_back: std::mem::take(&mut self.kept_back) });
     }
 
     /// An alarm comes by the stream's time.
     fn alarm(&mut self, change: &Change, out: &mut impl Outlet) {
-        out.event(change.time_s, change.text());
+        out.event(Event { time_s: change.time_s, what: change.into(), kept_back: 0 });
     }
 }
 

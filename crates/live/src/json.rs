@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use rthstrack::Reading;
+use rthstrack::{Reading, Reason};
 
 use crate::alarm::{Alarm, Change};
 
@@ -76,6 +76,17 @@ pub(crate) fn displayed(out: &mut String, value: Option<&impl std::fmt::Display>
     }
 }
 
+/// A reason by its code and values, two keys that are null where there is none.
+pub(crate) fn reason(out: &mut String, reason: Option<&Reason>) {
+    key(out, "reason_code");
+    displayed(out, reason.map(|r| r.kind().code).as_ref());
+    key(out, "reason_values");
+    match reason {
+        Some(reason) => list(out, reason.values(), number),
+        None => out.push_str("null"),
+    }
+}
+
 /// Items between brackets, with commas.
 pub(crate) fn list<T>(out: &mut String, items: impl IntoIterator<Item = T>, mut item: impl FnMut(&mut String, T)) {
     out.push('[');
@@ -134,6 +145,7 @@ pub fn reading(out: &mut String, reading: &Reading) {
     boolean(out, reading.is_valid());
     key(out, "reason");
     displayed(out, t.reason.as_ref());
+    self::reason(out, t.reason.as_ref());
     out.push('}');
 }
 
@@ -175,20 +187,21 @@ fn whose(out: &mut String, actuator: Option<usize>) {
 
 /// The datagram of an alarm.
 pub fn change(out: &mut String, change: &Change) {
+    let alarm = &change.alarm;
     out.push_str("{\"alarm\":{");
     key(out, "name");
-    text(out, change.alarm.kind.name());
-    whose(out, change.alarm.actuator);
+    text(out, alarm.kind.name());
+    whose(out, alarm.actuator);
     key(out, "raised");
     boolean(out, change.raised);
     key(out, "value");
-    number(out, change.alarm.value);
+    number(out, alarm.value);
     key(out, "limit");
-    number(out, change.alarm.limit);
+    number(out, alarm.limit);
     key(out, "time_s");
     number(out, change.time_s);
     key(out, "text");
-    text(out, &change.text());
+    text(out, &if change.raised { alarm.text() } else { alarm.kind.over_text(alarm.actuator) });
     out.push_str("}}");
 }
 
@@ -255,6 +268,8 @@ mod tests {
             "delay_interval_s",
             "valid",
             "reason",
+            "reason_code",
+            "reason_values",
         ];
         expected.sort_unstable();
         assert_eq!(keys, expected);
@@ -293,5 +308,21 @@ mod tests {
         assert!(value["alarm"]["text"].as_str().unwrap().starts_with("advisory"));
         let standing: Value = serde_json::from_str(&made(|o| alarm(o, &alarms.all()[0]))).unwrap();
         assert_eq!((&standing["active"], &standing["latched"]), (&Value::Bool(true), &Value::Bool(false)));
+    }
+    #[test]
+    fn no_key_that_0_1_0_wrote_is_gone() {
+        let old = |name: &str| -> Value {
+            let path = format!("{}/../../tests/data/0.1.0/{name}", env!("CARGO_MANIFEST_DIR"));
+            serde_json::from_str(std::fs::read_to_string(path).unwrap().lines().next().unwrap()).unwrap()
+        };
+        let keys = |value: &Value| value.as_object().unwrap().keys().cloned().collect::<Vec<String>>();
+        let one = crate::alarm::tests::reading(0, 2.0, 1.0, 0.02);
+        let new: Value = serde_json::from_str(&made(|o| reading(o, &one))).unwrap();
+        assert!(keys(&old("readings.jsonl")).iter().all(|key| new.get(key).is_some()));
+        let mut alarms = Alarms::new(AlarmConfig { limit_delay_s: Some(0.01), ..AlarmConfig::default() }, 1);
+        let mut sent = String::new();
+        alarms.read(&one, |c| change(&mut sent, &c));
+        let new: Value = serde_json::from_str(&sent).unwrap();
+        assert!(keys(&old("alarms.jsonl")["alarm"]).iter().all(|key| new["alarm"].get(key).is_some()));
     }
 }

@@ -9,7 +9,8 @@
 //! 1. [`settings`]: the user's settings, every key checked.
 //! 2. [`layout`] and [`mod@line`]: bytes to samples. Pure.
 //! 3. [`sequence`]: what was lost, repeated, reordered, by the sender's counter. Pure.
-//! 4. [`engine`]: fills short gaps, starts windows anew, steps the monitor. Pure; so are [`alarm`] and `pace`, which it uses.
+//! 4. [`engine`]: fills short gaps, starts windows anew, steps the monitor. Pure; so are [`alarm`], [`event`] and `pace`, which it
+//!    uses.
 //! 5. `receive`, `lines`: the receiving thread. It waits for its input and for nothing else.
 //! 6. `outlets`: that thread's end of all queues, and the datagrams that it sends itself.
 //! 7. `publish`: the threads behind it; `board` is what they keep for the page and the terminal view.
@@ -24,6 +25,7 @@
 pub mod alarm;
 mod board;
 pub mod engine;
+pub mod event;
 pub mod json;
 pub mod layout;
 pub mod line;

@@ -7,6 +7,7 @@ use std::thread;
 use std::time::Duration;
 
 use crate::engine::Engine;
+use crate::event::Happening;
 use crate::line::{Line, LineParser, MAX_LINE, Splitter};
 use crate::outlets::Outlets;
 use crate::receive::{Reminded, Rounds};
@@ -145,8 +146,8 @@ impl Taker {
             Line::Malformed => {
                 engine.malformed();
                 if self.reminded.is_due(now_s, 0) {
-                    let text = format!("malformed: {}: expected {}", excerpt(line), self.parser.expected());
-                    engine.tell(now_s, text, out);
+                    let (line, expected) = (excerpt(line), self.parser.expected().to_string());
+                    engine.tell(now_s, Happening::MalformedLine { line, expected }, out);
                 }
                 if engine.totals().malformed == HOPELESS && engine.totals().tally.received == 0 {
                     engine.fail(format!(

@@ -17,6 +17,7 @@ use socket2::SockRef;
 use crate::alarm::Kind;
 use crate::board::Board;
 use crate::engine::{Engine, EngineConfig, Totals};
+use crate::event::{Happening, LogState};
 use crate::layout::Layout;
 use crate::line::LineParser;
 use crate::lines::{Input, Lines};
@@ -270,13 +271,12 @@ impl Live {
         self.page.status()
     }
 
-    /// What the log's writer says of itself.
-    pub fn note_log(&self, state: Option<String>) {
-        // Numbers may change often; another first word is something new.
-        let kind = |text: &str| text.split(|c: char| !c.is_alphanumeric()).next().map(str::to_owned);
+    /// What the log's writer says of itself; `None` when there is no log.
+    pub fn note_log(&self, state: Option<LogState>) {
         let mut log = locked(&self.shared.log);
-        if let Some(text) = state.as_ref().filter(|text| log.as_deref().map(kind) != Some(kind(text))) {
-            self.shared.remark(format!("log: {text}"));
+        // Its reason may change, which is nothing new.
+        if let Some(state) = state.as_ref().filter(|new| log.as_ref().map(LogState::code) != Some(new.code())) {
+            self.shared.remark(Happening::Log { state: state.clone() });
         }
         *log = state;
     }
@@ -352,11 +352,7 @@ fn open_source(source: &SourceConfig, shared: &Shared) -> Result<(Source, String
             let socket = bind(*address).map_err(refused(format!("cannot listen on {address}")))?;
             let granted = SockRef::from(&socket).recv_buffer_size().unwrap_or(SMALL_BUFFER);
             if granted < SMALL_BUFFER {
-                shared.remark(format!(
-                    "the system grants only {} KiB for datagrams that wait; its administrator can allow more (Linux: \
-                     net.core.rmem_max)",
-                    granted >> 10
-                ));
+                shared.remark(Happening::SmallBuffer { kib: granted >> 10 });
             }
             let (bits, at) = (layout.counter_bits(), local(Some(&socket)));
             let receiver = Receiver { socket, senders: senders.clone(), layout };

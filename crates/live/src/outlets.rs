@@ -9,6 +9,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 
 use crate::alarm::{Alarm, Change};
 use crate::engine::{Outlet, Sample, Totals};
+use crate::event::{Event, Happening};
 use crate::json;
 use crate::shared::Shared;
 
@@ -19,7 +20,7 @@ use crate::shared::Shared;
 pub(crate) enum Item {
     Reading(Reading),
     Alarm(usize, Alarm),
-    Event(f64, String),
+    Event(Event),
 }
 
 /// A reading for the log.
@@ -27,7 +28,7 @@ pub(crate) enum Item {
 pub(crate) struct Judged {
     pub(crate) reading: Reading,
     pub(crate) totals: Totals,
-    pub(crate) raised: u8,
+    pub(crate) raised: u32,
 }
 
 /// How deep the queues are, in seconds.
@@ -102,7 +103,7 @@ impl Sender {
         if let Err(error) = self.socket.send_to(text.as_bytes(), self.to)
             && shared.unsent.fetch_add(1, Relaxed) == 0
         {
-            shared.remark(format!("nothing can be sent to {}: {error}; what is not sent is counted", self.to));
+            shared.remark(Happening::Unsent { to: self.to, error: error.to_string() });
         }
     }
 }
@@ -190,7 +191,7 @@ impl Outlet for Outlets {
         self.item(Item::Alarm(number, *alarm));
     }
 
-    fn judged(&mut self, reading: &Reading, totals: &Totals, raised: u8) {
+    fn judged(&mut self, reading: &Reading, totals: &Totals, raised: u32) {
         if let Some(file) = &mut self.queues.file
             && file.push(*reading).is_err()
         {
@@ -236,7 +237,7 @@ impl Outlet for Outlets {
         }
     }
 
-    fn event(&mut self, time_s: f64, text: String) {
-        self.item(Item::Event(time_s, text));
+    fn event(&mut self, event: Event) {
+        self.item(Item::Event(event));
     }
 }

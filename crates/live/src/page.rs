@@ -4,8 +4,9 @@ use std::sync::{Arc, Mutex};
 
 use rthstrack::Monitor;
 
-use crate::alarm::AlarmConfig;
-use crate::board::{Board, Event};
+use crate::alarm::{AlarmConfig, Kind};
+use crate::board::Board;
+use crate::event::LogState;
 use crate::json::{self, boolean, key, list, number, optional, text, whole};
 use crate::settings::OutputsConfig;
 use crate::shared::{Shared, locked};
@@ -65,7 +66,7 @@ impl Page {
         self.scope(&mut out, &board, since);
         self.alarms(&mut out, &board);
         key(&mut out, "events");
-        list(&mut out, board.events_since(since), event);
+        list(&mut out, board.events_since(since), |out, event| event.write(out));
         let version = board.version;
         drop(board);
         key(&mut out, "spectrum");
@@ -93,7 +94,7 @@ impl Page {
         });
         self.alarms(&mut out, &board);
         key(&mut out, "events");
-        list(&mut out, board.last_events(STATUS_EVENTS), event);
+        list(&mut out, board.last_events(STATUS_EVENTS), |out, event| event.write(out));
         out.push('}');
         out
     }
@@ -116,7 +117,10 @@ impl Page {
         key(out, "age_s");
         number(out, shared.age_s());
         key(out, "log");
-        json::displayed(out, locked(&shared.log).as_ref());
+        let log = locked(&shared.log);
+        json::displayed(out, log.as_ref());
+        key(out, "log_code");
+        json::displayed(out, log.as_ref().map(LogState::code).as_ref());
         out.push('}');
     }
 
@@ -162,15 +166,6 @@ impl Page {
     }
 }
 
-fn event(out: &mut String, event: &Event) {
-    out.push('{');
-    key(out, "time_s");
-    number(out, event.time_s);
-    key(out, "text");
-    text(out, &event.text);
-    out.push('}');
-}
-
 fn hello(monitor: &Monitor, limits: &AlarmConfig, source: &str, outputs: &OutputsConfig) -> String {
     let config = monitor.config();
     let mut made = String::from("{");
@@ -209,20 +204,34 @@ fn hello(monitor: &Monitor, limits: &AlarmConfig, source: &str, outputs: &Output
     text(out, source);
     key(out, "limits");
     out.push('{');
-    for (name, value) in [
-        ("delay_s", limits.limit_delay_s),
-        ("amplitude", limits.limit_amplitude),
-        ("critical_delay_s", limits.critical_delay_s),
-        ("critical_fraction", limits.critical_delay_s.map(|_| limits.critical_fraction)),
-        ("lost", limits.limit_lost.map(|n| n as f64)),
-        ("silence_s", limits.silence_s),
-        ("unjudged_s", limits.unjudged_s),
-    ] {
-        key(out, name);
-        optional(out, value);
+    for setting in AlarmConfig::SETTINGS.iter().filter(|setting| setting.is_limit) {
+        // A share of what is not given is no limit.
+        let is_idle = setting.name == "critical_fraction" && limits.critical_delay_s.is_none();
+        key(out, limit_name(setting.name));
+        optional(out, limits.get(setting.name).filter(|_| !is_idle));
     }
     key(out, "latch");
     boolean(out, limits.latch);
-    out.push_str("}}");
+    out.push('}');
+    key(out, "alarm_kinds");
+    list(out, Kind::ALL.iter().map(|kind| kind.row()), |out, row| {
+        out.push('{');
+        for (name, value) in [
+            ("name", Some(row.name)),
+            ("title", Some(row.title)),
+            ("quantity", row.quantity),
+            ("limit", Some(limit_name(row.setting))),
+        ] {
+            key(out, name);
+            json::displayed(out, value.as_ref());
+        }
+        out.push('}');
+    });
+    out.push('}');
     made
+}
+
+/// What the page calls a limit.
+fn limit_name(setting: &str) -> &str {
+    setting.strip_prefix("limit_").unwrap_or(setting)
 }

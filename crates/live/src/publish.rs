@@ -10,6 +10,7 @@ use std::time::Duration;
 use rthstrack::Reading;
 use rtrb::Consumer;
 
+use crate::event::Happening;
 use crate::json;
 use crate::outlets::Item;
 use crate::page::Page;
@@ -50,7 +51,8 @@ pub(crate) fn write_readings(shared: &Arc<Shared>, mut file: File, path: &Path, 
             if let Err(error) = file.write_all(lines.as_bytes()) {
                 // No part of a line stays behind; a device has no length to go back to.
                 let _ = file.set_len(length);
-                shared.remark(format!("readings are no longer written to {}: {error}", path.display()));
+                let (path, error) = (path.display().to_string(), error.to_string());
+                shared.remark(Happening::ReadingsStopped { path, error });
                 return;
             }
             length += lines.len() as u64;

@@ -9,6 +9,7 @@ use std::time::Duration;
 use socket2::{Domain, Protocol, Socket, Type};
 
 use crate::engine::Engine;
+use crate::event::Happening;
 use crate::layout::{Layout, MAX_DATAGRAM};
 use crate::outlets::Outlets;
 use crate::shared::Shared;
@@ -113,18 +114,13 @@ impl Receiver {
                     errors = 0;
                     if self.accepts(from) {
                         if let Some(other) = senders.other(now_s, from) {
-                            let text = format!(
-                                "datagrams come from {from} and from {other}: two senders make no sense of the counter; \
-                                 end one of them (--allow takes one machine only)"
-                            );
-                            engine.tell(now_s, text, &mut out);
+                            engine.tell(now_s, Happening::TwoSenders { sender: from, other }, &mut out);
                         }
                         self.take(now_s, &datagram[..len], &mut values, &mut engine, &mut out, &mut reminded);
                     } else {
                         engine.refused();
                         if reminded.is_due(now_s, 0) {
-                            let text = format!("datagrams from {} are refused: not an accepted sender", from.ip());
-                            engine.tell(now_s, text, &mut out);
+                            engine.tell(now_s, Happening::SenderRefused { sender: from.ip() }, &mut out);
                         }
                     }
                 }
@@ -163,9 +159,8 @@ impl Receiver {
         let Some(n) = self.layout.n_samples(datagram.len()).filter(|_| datagram.len() <= MAX_DATAGRAM) else {
             engine.malformed();
             if reminded.is_due(now_s, 1) {
-                let text =
-                    format!("malformed: a datagram of {} bytes, expected {}", datagram.len(), self.layout.expected());
-                engine.tell(now_s, text, out);
+                let (bytes, expected) = (datagram.len(), self.layout.expected().to_string());
+                engine.tell(now_s, Happening::MalformedSize { bytes, expected }, out);
             }
             return;
         };
@@ -179,9 +174,7 @@ impl Receiver {
                 None => {
                     engine.malformed();
                     if reminded.is_due(now_s, 2) {
-                        let text = "malformed: a counter that is no whole number, negative, or beyond what its type counts \
-                                    exactly (2^24 for f32, 2^53 for f64)";
-                        engine.tell(now_s, text.to_owned(), out);
+                        engine.tell(now_s, Happening::MalformedCounter {}, out);
                     }
                 }
             }

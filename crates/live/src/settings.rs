@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use rthstrack::{Error, Monitor, MonitorConfig};
 use serde_json::{Map, Value};
 
-use crate::alarm::AlarmConfig;
+use crate::alarm::{AlarmConfig, Kind, Range, Setting, Source};
 use crate::layout::{ByteOrder, Field, LayoutConfig, Number};
 use crate::line::{Column, Format, LinesConfig};
 
@@ -143,7 +143,7 @@ impl LiveConfig {
     }
 }
 
-/// One object of settings, whose keys are used up.
+/// One object of settings, whose keys are used up. Not serde's derive, which stops at the first mistake.
 struct Keys<'a> {
     mistakes: &'a mut Vec<String>,
     whose: String,
@@ -235,30 +235,28 @@ fn one_of<T: Copy>(value: &Value, names: &[(&str, T)]) -> Option<T> {
 const UNJUDGED_S: f64 = 2.0;
 
 fn read_alarms(keys: &mut Keys<'_>, window_s: f64) -> AlarmConfig {
-    let usual = AlarmConfig::default();
-    // Without a limit is not the same as the default.
-    let silence_s = if keys.map.contains_key("silence_s") { keys.number("silence_s") } else { usual.silence_s };
-    let (limit_delay_s, limit_amplitude) = (keys.number("limit_delay_s"), keys.number("limit_amplitude"));
-    let critical_delay_s = keys.number("critical_delay_s");
-    // Who has set a limit is told when nothing watches it.
-    let watched = limit_delay_s.or(limit_amplitude).or(critical_delay_s).is_some();
-    let unjudged_s = if keys.map.contains_key("unjudged_s") {
-        keys.number("unjudged_s")
-    } else {
-        (watched && window_s > 0.0).then_some(window_s + UNJUDGED_S)
-    };
-    AlarmConfig {
-        limit_delay_s,
-        limit_amplitude,
-        critical_delay_s,
-        critical_fraction: keys.number("critical_fraction").unwrap_or(usual.critical_fraction),
-        limit_lost: keys.whole("limit_lost"),
-        silence_s,
-        unjudged_s,
-        hysteresis: keys.number("hysteresis").unwrap_or(usual.hysteresis),
-        minimum_duration_s: keys.number("minimum_duration_s").unwrap_or(usual.minimum_duration_s),
-        latch: keys.flag("latch").unwrap_or(usual.latch),
+    let mut config = AlarmConfig::default();
+    let is_unjudged_given = keys.map.contains_key("unjudged_s");
+    for Setting { name, range, .. } in AlarmConfig::SETTINGS {
+        // Without a limit is not the same as the default.
+        if !keys.map.contains_key(*name) {
+            continue;
+        }
+        let value = match range {
+            Range::Count => keys.whole(name).map(|n| n as f64),
+            Range::Flag => keys.flag(name).map(|flag| f64::from(u8::from(flag))),
+            _ => keys.number(name),
+        };
+        config.put(name, value);
     }
+    // Who has set a limit is told when nothing watches it.
+    let mut of_readings =
+        Kind::ALL.iter().map(|kind| kind.row()).filter(|row| matches!(row.source, Source::Reading(_)));
+    let is_watched = of_readings.any(|row| (row.limit)(&config).is_some());
+    if !is_unjudged_given && is_watched && window_s > 0.0 {
+        config.unjudged_s = Some(window_s + UNJUDGED_S);
+    }
+    config
 }
 
 fn read_outputs(keys: &mut Keys<'_>) -> OutputsConfig {

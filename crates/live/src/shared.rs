@@ -5,6 +5,7 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::engine::{Engine, Totals};
+use crate::event::{Happening, LogState};
 use crate::sequence::Tally;
 
 /// The lock, whoever panicked with it.
@@ -83,10 +84,10 @@ pub(crate) struct Shared {
     silent: AtomicBool,
     pub(crate) stop: AtomicBool,
     pub(crate) reset: AtomicBool,
-    /// The log's state in words, as its writer tells it.
-    pub(crate) log: Mutex<Option<String>>,
+    /// As its writer tells it.
+    pub(crate) log: Mutex<Option<LogState>>,
     /// Said by other threads than the receiving one.
-    pub(crate) remarks: Mutex<Vec<String>>,
+    pub(crate) remarks: Mutex<Vec<Happening>>,
     fatal: Mutex<Option<String>>,
     finished: Mutex<bool>,
     finish: Condvar,
@@ -172,10 +173,10 @@ impl Shared {
         self.stop.load(Relaxed)
     }
 
-    pub(crate) fn remark(&self, text: String) {
+    pub(crate) fn remark(&self, what: Happening) {
         let mut remarks = locked(&self.remarks);
         if remarks.len() < 100 {
-            remarks.push(text);
+            remarks.push(what);
         }
     }
 

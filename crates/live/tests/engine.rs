@@ -5,6 +5,7 @@ use std::sync::Arc;
 use rthstrack::{EvaluatorConfig, Monitor, MonitorConfig, MonitorState, Reading, Reason};
 use rthstrack_live::alarm::{Alarm, AlarmConfig, Change, Kind};
 use rthstrack_live::engine::{Engine, EngineConfig, Outlet, Sample, Totals};
+use rthstrack_live::event::{Event, Happening};
 
 const RATE_HZ: f64 = 256.0;
 
@@ -19,7 +20,7 @@ struct Memory {
     changes: Vec<Change>,
     events: Vec<(f64, String)>,
     evaluated: Vec<f64>,
-    raised: u8,
+    raised: u32,
 }
 
 impl Outlet for Memory {
@@ -30,7 +31,7 @@ impl Outlet for Memory {
         self.changes.push(*change);
     }
     fn standing(&mut self, _: usize, _: &Alarm) {}
-    fn judged(&mut self, _: &Reading, _: &Totals, raised: u8) {
+    fn judged(&mut self, _: &Reading, _: &Totals, raised: u32) {
         self.raised = raised;
     }
     fn sample(&mut self, s: &Sample<'_>) {
@@ -40,8 +41,8 @@ impl Outlet for Memory {
         self.evaluated.push(time_s);
     }
     fn restarted(&mut self) {}
-    fn event(&mut self, time_s: f64, text: String) {
-        self.events.push((time_s, text));
+    fn event(&mut self, event: Event) {
+        self.events.push((event.time_s, event.text()));
     }
 }
 
@@ -360,7 +361,8 @@ fn an_actuator_that_moves_and_is_not_judged_is_an_alarm() {
 #[test]
 fn no_text_of_a_sender_reaches_a_terminal_as_a_command() {
     let mut bench = Bench::new(AlarmConfig::default());
-    bench.engine.tell(0.0, "x\u{1b}]0;owned\u{7}".to_owned(), &mut bench.out);
+    let (line, expected) = ("x\u{1b}]0;owned\u{7}".to_owned(), "a sample".to_owned());
+    bench.engine.tell(0.0, Happening::MalformedLine { line, expected }, &mut bench.out);
     bench.engine.fail("y\u{1b}[2J".to_owned());
     assert_eq!(bench.told("x\u{fffd}]0;owned\u{fffd}"), 1);
     assert_eq!(bench.engine.fatal(), Some("y\u{fffd}[2J"));

@@ -7,6 +7,7 @@ use rthstrack::{Monitor, MonitorConfig, MonitorState, Reading};
 use rthstrack_live::LiveConfig;
 use rthstrack_live::alarm::{Alarm, AlarmConfig, Change};
 use rthstrack_live::engine::{Engine, EngineConfig, Outlet, Sample, Totals};
+use rthstrack_live::event::Event;
 use rthstrack_live::layout::{ByteOrder, Field, Layout, LayoutConfig, Number};
 use rthstrack_live::line::{Column, Format, Line, LineParser, LinesConfig, Splitter};
 use serde_json::{Value, json};
@@ -47,14 +48,14 @@ impl Outlet for Nowhere {
     fn reading(&mut self, _: &Reading) {}
     fn alarm(&mut self, _: &Change) {}
     fn standing(&mut self, _: usize, _: &Alarm) {}
-    fn judged(&mut self, _: &Reading, _: &Totals, _: u8) {}
+    fn judged(&mut self, _: &Reading, _: &Totals, _: u32) {}
     fn sample(&mut self, _: &Sample<'_>) {
         self.0 += 1;
     }
     fn evaluated(&mut self, _: f64, _: &Monitor, _: &MonitorState) {}
     fn restarted(&mut self) {}
-    fn event(&mut self, _: f64, text: String) {
-        assert!(!text.contains('\n'));
+    fn event(&mut self, event: Event) {
+        assert!(!event.text().contains('\n'));
     }
 }
 

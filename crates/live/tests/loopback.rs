@@ -111,6 +111,8 @@ fn a_controller_gets_each_reading_and_each_alarm_as_a_datagram() {
     let hello: Value = serde_json::from_str(&live.hello()).unwrap();
     assert_eq!((&hello["rate_hz"], &hello["limits"]["delay_s"]), (&json!(256.0), &json!(0.02)));
     assert_eq!(hello["limits"]["amplitude"], Value::Null);
+    let kinds = hello["alarm_kinds"].as_array().unwrap();
+    assert!(kinds.iter().all(|kind| hello["limits"].get(kind["limit"].as_str().unwrap()).is_some()), "{kinds:?}");
 
     // An alarm, and its reset from this machine.
     sender.send(512, 0.040);
@@ -126,7 +128,15 @@ fn a_controller_gets_each_reading_and_each_alarm_as_a_datagram() {
     });
     let status: Value = serde_json::from_str(&live.status()).unwrap();
     assert_eq!(status["readings"][0]["index"], json!(1535));
-    assert!(status["events"].as_array().unwrap().iter().any(|e| e["text"] == "alarms reset"));
+    let events = status["events"].as_array().unwrap();
+    let event = |code: &str| events.iter().find(|e| e["code"] == code).unwrap_or_else(|| panic!("{code}: {events:?}"));
+    assert_eq!(
+        (&event("alarms_reset")["text"], &event("alarms_reset")["values"]["still_active"]),
+        (&json!("alarms reset"), &json!(0))
+    );
+    let values = &event("alarm_raised")["values"];
+    assert_eq!((&values["alarm"], &values["actuator"], &values["limit"]), (&json!("delay"), &json!(0), &json!(0.02)));
+    assert_eq!(event("alarm_over")["values"]["alarm"], json!("delay"));
     assert!(live.alarmed());
 
     live.stop();
@@ -193,7 +203,10 @@ fn only_accepted_senders_are_heard() {
     Sender::to(&live).send(50, 0.0);
     until("refused", || live.summary().totals.refused == 50);
     assert_eq!(live.summary().totals.tally.received, 0);
-    assert!(live.status().contains("datagrams from 127.0.0.1 are refused"));
+    let status: Value = serde_json::from_str(&live.status()).unwrap();
+    let refused = &status["events"][0];
+    assert_eq!((&refused["code"], &refused["values"]["sender"]), (&json!("sender_refused"), &json!("127.0.0.1")));
+    assert_eq!(refused["text"], "datagrams from 127.0.0.1 are refused: not an accepted sender");
     let frame: Value = serde_json::from_str(&live.frame(0).0).unwrap();
     assert_eq!((&frame["state"], &frame["spectrum"]), (&json!("waiting"), &Value::Null));
 }

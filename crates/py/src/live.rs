@@ -3,10 +3,12 @@
 use std::time::Duration;
 
 use numpy::{IntoPyArray, ndarray::Array2};
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
 use rthstrack::MonitorConfig;
+use rthstrack_live::alarm::{AlarmConfig, Setting};
+use rthstrack_live::event::LogState;
 use rthstrack_live::{LiveConfig, LiveError, LoggedReading};
 use serde_json::{Map, Number, Value};
 
@@ -191,12 +193,41 @@ impl Live {
         Ok(dict)
     }
 
-    /// What the log's writer says of itself; None when there is no log.
-    fn note_log(&self, state: Option<String>) {
+    /// Where the log's writer stands, "writing" or "stopped" with the reason; None when there is no log.
+    #[pyo3(signature = (state, why = None))]
+    fn note_log(&self, state: Option<&str>, why: Option<String>) -> PyResult<()> {
+        let state = match state {
+            None => None,
+            Some("writing") => Some(LogState::Writing),
+            Some("stopped") => Some(LogState::Stopped(why.unwrap_or_default())),
+            Some(other) => {
+                return Err(PyValueError::new_err(format!("a log is 'writing' or 'stopped', not '{other}'")));
+            }
+        };
         self.run.note_log(state);
+        Ok(())
     }
 }
 
+/// The settings of alarms in their order, a dict each.
+#[pyfunction]
+fn alarm_settings(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
+    let usual = AlarmConfig::default();
+    let row = |setting: &Setting| {
+        let dict = PyDict::new(py);
+        dict.set_item("name", setting.name)?;
+        dict.set_item("range", setting.range.name())?;
+        dict.set_item("unit", setting.unit)?;
+        dict.set_item("default", usual.get(setting.name))?;
+        dict.set_item("is_limit", setting.is_limit)?;
+        dict.set_item("option", setting.option)?;
+        dict.set_item("help", setting.help)?;
+        Ok(dict)
+    };
+    AlarmConfig::SETTINGS.iter().map(row).collect()
+}
+
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(alarm_settings, module)?)?;
     module.add_class::<Live>()
 }

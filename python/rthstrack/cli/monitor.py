@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rthstrack.cli import addresses
 from rthstrack.cli.commands import COMMANDS
-from rthstrack.cli.monitor_options import Plan, add_options, checked_plan
+from rthstrack.cli.monitor_options import Plan, add_options, checked_plan, limits_given
 from rthstrack.cli.running import Ended, say
 from rthstrack.errors import RthstrackError, SettingError, printable
 
@@ -31,7 +31,7 @@ _IN_WORDS = {
     "not_written": "readings that the file could not take",
     "unsent": "datagrams that could not be sent",
 }
-_LIMITS = ("limit_delay", "limit_amplitude", "critical_delay", "limit_lost", "silence")
+_OF_ALARMS = ("alarm_raised", "alarm_over")
 # The status is looked at so often.
 _PERIOD_S = 0.1
 
@@ -101,25 +101,9 @@ class _Seen:
     def take(self, status: Mapping[str, Any]) -> None:
         self.status = status
         # An alarm may have come and gone since the last status; its event has not.
-        self.alarm |= any(
-            alarm["active"] or alarm["latched"]
-            for alarm in status["alarms"]
-            if self._counts(alarm["name"] != "silence")
-        ) or any(
-            _is_raised(event["text"]) for event in status["events"] if self._counts(not _is_silence(event["text"]))
-        )
-
-    def _counts(self, is_other: bool) -> bool:
-        return is_other or self._silence_counts
-
-
-def _is_raised(text: str) -> bool:
-    """Whether an event's text says that an alarm was raised."""
-    return text.startswith("advisory") and not text.endswith(" is over")
-
-
-def _is_silence(text: str) -> bool:
-    return text.startswith("advisory: no sample for")
+        raised = {alarm["name"] for alarm in status["alarms"] if alarm["active"] or alarm["latched"]}
+        raised |= {event["values"]["alarm"] for event in status["events"] if event["code"] == "alarm_raised"}
+        self.alarm |= bool(raised if self._silence_counts else raised - {"silence"})
 
 
 def _nothing_judged(plan: Plan, live: Live, summary: Mapping[str, int], status: Mapping[str, Any]) -> str | None:
@@ -268,12 +252,12 @@ class _News:
         for event in status["events"]:
             key = (event["time_s"], event["text"])
             # What the log says of itself is told where it happens.
-            if key in self._known or event["text"].startswith("log: "):
+            if key in self._known or event["code"] == "log":
                 continue
             self._known[key] = None
-            is_alarm = event["text"].startswith("advisory")
-            raised = _is_raised(event["text"])
-            yield f"{'ALARM ' if raised else ''}{_at(event['time_s'])}{named(event['text'], self._names)}", is_alarm
+            head = "ALARM " if event["code"] == "alarm_raised" else ""
+            text = named(event["text"], event["values"].get("actuator"), self._names)
+            yield f"{head}{_at(event['time_s'])}{text}", event["code"] in _OF_ALARMS
         # A status has recent events only; so many are enough to know them by.
         while len(self._known) > 1024:
             del self._known[next(iter(self._known))]
@@ -307,8 +291,7 @@ def _addresses(args: argparse.Namespace, plan: Plan, live: Live, page: Any) -> I
         yield f"a datagram 'reset' to udp://{live.control_address()} resets alarms"
     if args.log is not None:
         yield f"log: {args.log}"
-    limited = [option for option in _LIMITS if getattr(args, option)]
-    if limited and not (args.no_latch or args.exit_on_alarm or args.control is not None or _is_viewed(args)):
+    if limits_given(args) and not (args.no_latch or args.exit_on_alarm or args.control is not None or _is_viewed(args)):
         yield "an alarm stays until the end, for there is no way to reset it: --control [PORT], --view or --no-latch"
 
 

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rthstrack._core import settings_table
+from rthstrack._core import alarm_settings, settings_table
 from rthstrack.cli import addresses
 from rthstrack.cli.arguments import count, expected_delay_mistake, not_negative, number, positive
 from rthstrack.cli.setting_options import setting_options
@@ -109,18 +109,12 @@ def _add_evaluation(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> No
 
 def _add_alarms(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> None:
     add = _adder(group, wrong)
-    add("--limit-delay", positive, "S", "largest |delay|")
-    add("--limit-amplitude", positive, "X", "largest |amplitude - 1|")
-    add("--critical-delay", positive, "S", "delay at which the test becomes unstable ('rthstrack simulate' tells it)")
-    add("--critical-fraction", positive, "X", "share of --critical-delay that the delay may reach (0.5)")
-    add("--limit-lost", count, "N", "most samples lost within a window")
-    add("--silence", not_negative, "S", "longest time without a sample (1; counts for --exit-on-alarm only where it is "
-        "given; 0: watch none)")  # fmt: skip
-    add("--hysteresis", _share, "X", "an alarm is over when this share of its limit below it (0.1)")
-    add("--alarm-after", not_negative, "S", "raise it only when the limit was exceeded for so long (0)")
-    group.add_argument(
-        "--no-latch", action="store_true", help="an alarm that is over is gone; else it waits for a reset"
-    )
+    for setting in _alarm_options():
+        if setting["range"] == "flag":
+            group.add_argument(setting["option"], action="store_true", help=setting["help"])
+        else:
+            metavar = setting["unit"].upper() or ("N" if setting["range"] == "count" else "X")
+            add(setting["option"], _RANGES[setting["range"]], metavar, setting["help"])
     add("--alarm-to", addresses.udp, "udp://HOST:PORT", "send a datagram (JSON) when an alarm is raised or over")
     add("--control", addresses.port, "PORT", "take datagrams 'reset' from this machine at this port (a free one)",
         nargs="?", const=0)  # fmt: skip
@@ -175,6 +169,21 @@ def _share(text: str) -> float:
     return value
 
 
+_RANGES: dict[str, Callable[[str], Any]] = {
+    "positive": positive, "positive_or_off": not_negative, "not_negative": not_negative, "share": _share,
+    "count": count,
+}  # fmt: skip
+
+
+def _alarm_options() -> list[dict[str, Any]]:
+    """The monitor's settings of alarms for which the command has an option."""
+    return [setting for setting in alarm_settings() if setting["option"]]
+
+
+def _given(args: argparse.Namespace, setting: Mapping[str, Any]) -> Any:
+    return getattr(args, setting["option"].lstrip("-").replace("-", "_"))
+
+
 # Checks ---------------------------------------------------------------------------------------------------------------
 
 
@@ -204,17 +213,6 @@ def checked_plan(args: argparse.Namespace, wrong: Mapping[str, str]) -> Plan:
         "check_pace": is_udp and not args.any_pace,
         "path": None,
     }
-    alarms = {
-        "limit_delay_s": args.limit_delay,
-        "limit_amplitude": args.limit_amplitude,
-        "critical_delay_s": args.critical_delay,
-        "critical_fraction": args.critical_fraction or 0.5,
-        "limit_lost": args.limit_lost,
-        "silence_s": 1.0 if args.silence is None else args.silence or None,
-        "hysteresis": 0.1 if args.hysteresis is None else args.hysteresis,
-        "minimum_duration_s": args.alarm_after or 0.0,
-        "latch": not args.no_latch,
-    }
     outputs = {
         **readings,
         "alarm_udp": args.alarm_to,
@@ -224,7 +222,27 @@ def checked_plan(args: argparse.Namespace, wrong: Mapping[str, str]) -> Plan:
         "names": list(layout.names),
         "units": list(layout.units),
     }
-    return Plan(layout, monitor, source, alarms, outputs)
+    return Plan(layout, monitor, source, _alarms(args), outputs)
+
+
+def limits_given(args: argparse.Namespace) -> bool:
+    """Whether the user has set any limit for an alarm."""
+    return any(_given(args, setting) for setting in _alarm_options() if setting["is_limit"])
+
+
+def _alarms(args: argparse.Namespace) -> dict[str, Any]:
+    """The settings of alarms by their names, each with its default where nothing is given."""
+    found = {}
+    for setting in _alarm_options():
+        given, usual = _given(args, setting), setting["default"]
+        if setting["range"] == "flag":
+            value = bool(usual) != given
+        elif given is None:
+            value = usual
+        else:
+            value = None if setting["range"] == "positive_or_off" and not given else given
+        found[setting["name"]] = value
+    return found
 
 
 def _layout(args: argparse.Namespace, mistakes: list[str]) -> Layout:

@@ -46,7 +46,7 @@ class Source(Protocol):
 
     def take_samples(self) -> dict[str, Any]: ...
     def take_readings(self) -> dict[str, Any]: ...
-    def note_log(self, state: str | None) -> None: ...
+    def note_log(self, state: str | None, why: str | None = None) -> None: ...
 
 
 def readings_path(path: Path) -> Path:
@@ -138,11 +138,11 @@ class Log:
         if self.problem is not None:
             return
         why = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else str(error) or repr(error)
-        self.problem = f"stopped: {why}"
+        self.problem = why
         for stream in (self._samples, self._readings):
             with contextlib.suppress(OSError):
                 stream.end()
-        self._source.note_log(self.problem)
+        self._source.note_log("stopped", why)
         self._say(f"the log {self._samples.path} stopped: {why}; what is in it can be read, monitoring goes on")
 
 

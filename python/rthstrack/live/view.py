@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import math
 import os
-import re
 import select
 import sys
 import textwrap
@@ -28,7 +27,6 @@ if TYPE_CHECKING:
 _EVENTS = 6
 # A valid reading may be so much later than its window is long.
 _PATIENCE_S = 2.0
-_AT_REST = "too little motion"
 # Below so many columns there is no room for intervals.
 _FULL_WIDTH = 100
 _FAILED = {"unsent": "datagrams could not be sent", "not_written": "readings could not be written"}
@@ -98,7 +96,7 @@ class Judged:
         readings = {reading["actuator"]: reading for reading in status["readings"] if reading is not None}
         for actuator, last_s in enumerate(self._last_s):
             reading = readings.get(actuator)
-            fine = reading is not None and (reading["valid"] or _AT_REST in (reading["reason"] or ""))
+            fine = reading is not None and (reading["valid"] or reading["reason_code"] == "still")
             if last_s is None or now_s < last_s or fine:
                 since_s = reading["time_s"] if fine and reading is not None else now_s
                 self._last_s[actuator] = last_s = since_s
@@ -134,12 +132,11 @@ def shown(
     return Group(*top, *alarms, *([] if table is None else [table]), *spaced, *last[max(0, len(last) - room) :], *keys)
 
 
-def named(text: str, names: Sequence[str]) -> str:
-    """A text of the monitor with an actuator called by its name."""
-    found = re.search(r"\bactuator (\d+):", text)
-    if found is None or int(found[1]) >= len(names):
+def named(text: str, actuator: int | None, names: Sequence[str]) -> str:
+    """The monitor's text of an actuator, which it knows by its number, with the actuator called by its name."""
+    if actuator is None or actuator >= len(names):
         return text
-    return f"{text[: found.start()]}{names[int(found[1])]}:{text[found.end() :]}"
+    return text.replace(f"actuator {actuator}:", f"{names[actuator]}:", 1)
 
 
 def _line(text: str, style: str) -> Text:
@@ -165,7 +162,7 @@ def _alarms(status: Mapping[str, Any], names: Sequence[str], width: int, most: i
     lines: list[Text] = []
     for n, alarm in enumerate(raised):
         over = "" if alarm["active"] else " (over, held until it is reset)"
-        text = f"ALARM {printable(named(alarm['text'], names))}{over}"
+        text = f"ALARM {printable(named(alarm['text'], alarm['actuator'], names))}{over}"
         fitting = textwrap.wrap(text, max(width, 20), subsequent_indent="  ")
         is_last = n == len(raised) - 1
         if len(lines) + len(fitting) > most - (not is_last):
@@ -221,7 +218,7 @@ def _reading(reading: Mapping[str, Any], style: str, *, with_intervals: bool) ->
     amplitude = _with_interval(number("amplitude"), interval("amplitude_interval"), 4)
     delay = _with_interval(1e3 * number("delay_s"), interval("delay_interval_s"), 3, 1e3)
     frequency = number("equivalent_frequency_hz")
-    reason = _short(reading["reason"] or "")
+    reason = _short(reading)
     said = Text("valid", style="green") if reading["valid"] else Text(reason or "not valid", style="yellow")
     if reading["valid"] and reason:
         said.append(f": {reason}", style="dim")
@@ -229,12 +226,12 @@ def _reading(reading: Mapping[str, Any], style: str, *, with_intervals: bool) ->
     return [Text(amplitude, style=style), Text(delay, style=style), at, said]
 
 
-def _short(reason: str) -> str:
-    """A reason in the monitor's own options, where the estimators speak of a caller's arguments."""
-    ambiguous = re.search(r"ambiguous, delays of (\S+) and (\S+) ms fit", reason)
-    if ambiguous is not None:
-        return f"one tone, {ambiguous[1]} or {ambiguous[2]} ms: choose with --expected-delay S"
-    return printable(reason.removeprefix("not determined: "))
+def _short(reading: Mapping[str, Any]) -> str:
+    """A reading's reason in the monitor's own options, where the estimators speak of a caller's arguments."""
+    if reading["reason_code"] == "ambiguous":
+        one, other = (f"{1e3 * delay_s:.4f}" for delay_s in reading["reason_values"])
+        return f"one tone, {one} or {other} ms: choose with --expected-delay S"
+    return printable((reading["reason"] or "").removeprefix("not determined: "))
 
 
 def _with_interval(value: float, interval: Sequence[float] | None, places: int, factor: float = 1.0) -> str:
@@ -262,7 +259,7 @@ def _health(status: Mapping[str, Any]) -> list[Text]:
     log = health.get("log")
     if log:
         lost = f", {health['log_dropped']} samples did not fit" if health.get("log_dropped") else ""
-        is_bad = log.startswith("stopped") or lost
+        is_bad = health["log_code"] == "stopped" or lost
         lines.append(Text(f"log: {printable(log)}{lost}", style="bold red" if is_bad else "dim"))
     return lines
 

@@ -3,14 +3,6 @@
 (() => {
   const { find, element, write, seconds } = Page;
   const MOST_EVENTS = 200;
-  const WORDS = {
-    delay: "Delay",
-    amplitude: "Amplitude",
-    critical_delay: "Critical delay",
-    lost: "Lost samples",
-    silence: "Silence",
-    unjudged: "Not judged",
-  };
   const LATCHED = "latched — advisory — reset at the terminal or by control datagram";
 
   Panels.alarms = (run) => {
@@ -38,11 +30,11 @@
       shownAlarms = shown;
       const lines = trouble ? [element("li", trouble.kind, trouble.words)] : [];
       const active = run.alarms.filter((alarm) => alarm.active).length;
-      const howMany = `${active} run.alarms are active, ${run.alarms.length - active} latched.`;
+      const howMany = `${active} alarms are active, ${run.alarms.length - active} latched.`;
       if (run.alarms.length > 6) lines.push(element("li", "count", howMany));
       const order = [...run.alarms].sort((a, b) => Number(b.active) - Number(a.active));
       const called = ({ name, actuator }) =>
-        `${WORDS[name] ?? name}${actuator == null ? "" : ` · ${names[actuator] ?? actuator}`}`;
+        `${run.kinds.get(name)?.title ?? name}${actuator == null ? "" : ` · ${names[actuator] ?? actuator}`}`;
       for (const alarm of order) {
         const line = element("li", alarm.active ? "active" : "latched");
         line.append(element("strong", "", called(alarm)));
@@ -51,11 +43,13 @@
         line.append(element("span", "note", alarm.active ? since : LATCHED));
         lines.push(line);
       }
-      const watched = ["delay_s", "amplitude", "critical_delay_s"].some((name) => limits[name] != null);
+      const watched = [...run.kinds.values()].some(
+        ({ quantity, limit }) => ["amplitude", "delay"].includes(quantity) && limits[limit] != null,
+      );
       const calm = watched ? "No alarm." : "No alarm. No limit is set for amplitude or delay.";
       if (!lines.length) lines.push(element("li", "calm", calm));
       find(".alerts").replaceChildren(...lines);
-      // Which run.alarms there are is spoken; their numbers, which go on changing, are not.
+      // Which alarms there are is spoken; their numbers, which go on changing, are not.
       const spoken = order.map((alarm) => `${alarm.active ? "Alarm" : "Latched"}: ${called(alarm)}.`);
       write(find(".spoken"), run.alarms.length > 6 ? howMany : spoken.join(" "));
       run.panels.moving.mark();

@@ -64,20 +64,22 @@
     function writeCard(a) {
       const { host, verdict, amplitude, delay, reason } = cards[a];
       const one = run.latest[a];
-      const about = (name) => run.alarms.filter((alarm) => alarm.actuator === a && alarm.name.endsWith(name));
-      let worst = "";
+      const mine = run.alarms.filter((alarm) => alarm.actuator === a);
       for (const [name, { group }] of [
         ["amplitude", amplitude],
         ["delay", delay],
       ]) {
-        const [active, latched] = [about(name).some((x) => x.active), about(name).some((x) => x.latched && !x.active)];
-        group.classList.toggle("over", active);
-        group.classList.toggle("after", latched);
-        if (active) worst = "alarm";
-        else if (latched && !worst) worst = "latched";
+        const about = mine.filter((alarm) => run.isAbout(alarm, name));
+        group.classList.toggle(
+          "over",
+          about.some((alarm) => alarm.active),
+        );
+        group.classList.toggle(
+          "after",
+          about.some((alarm) => !alarm.active),
+        );
       }
-      if (about("unjudged").some((x) => x.active)) worst = "alarm";
-      else if (about("unjudged").length && !worst) worst = "latched";
+      const worst = mine.some((alarm) => alarm.active) ? "alarm" : mine.length ? "latched" : "";
       const valid = Boolean(one && one.valid);
       host.classList.toggle("invalid", one != null && !valid);
       write(verdict, worst || (one == null ? "no reading yet" : valid ? "valid" : "not valid"));

@@ -23,7 +23,11 @@
       const h = run.frame.health;
       const some = (value) => (value ? "odd" : "");
       healthRow("received", count(h.received));
-      healthRow("lost", count(h.lost), run.alarms.some((a) => a.active && a.name === "lost") ? "bad" : some(h.lost));
+      healthRow(
+        "lost",
+        count(h.lost),
+        run.alarms.some((a) => a.active && run.isAbout(a, "lost")) ? "bad" : some(h.lost),
+      );
       healthRow("repeated", count(h.repeated), some(h.repeated));
       healthRow("reordered", count(h.reordered), some(h.reordered));
       healthRow("malformed", count(h.malformed), some(h.malformed));
@@ -39,7 +43,7 @@
         run.frame.state === "silent" ? "bad" : "",
       );
       healthRow("readings", count(h.readings));
-      healthRow("log", h.log ?? "none", h.log && h.log !== "writing" ? "bad" : "");
+      healthRow("log", h.log ?? "none", h.log_code === "stopped" ? "bad" : "");
       healthRow("not logged", count(h.log_dropped), h.log_dropped ? "bad" : "");
       for (const [name, words] of [
         ["unsent", "not sent"],

@@ -96,7 +96,7 @@
         options.limits = told(limits, options.y.fixed, ideal);
         options.shades = holes(times, wanted[state.focus].out);
         options.marks = run.alarms
-          .filter((a) => a.name.endsWith(chart.name) && a.since_s != null && (state.all || a.actuator === state.focus))
+          .filter((a) => run.isAbout(a, chart.name) && a.since_s != null && (state.all || a.actuator === state.focus))
           .map((a) => ({ at: a.since_s }));
         chart.u.setData(options.data, false);
       }
@@ -145,7 +145,7 @@
       for (const { name } of moving) {
         run.host(name).parentElement.classList.toggle(
           "over",
-          run.alarms.some((a) => a.active && a.name.endsWith(name)),
+          run.alarms.some((a) => a.active && run.isAbout(a, name)),
         );
       }
     }

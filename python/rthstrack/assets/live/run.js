@@ -16,6 +16,9 @@ const Run = (() => {
       n,
       names: Array.from({ length: n }, (_, a) => String((hello.names || [])[a] ?? `actuator ${a}`)),
       limits: hello.limits || {},
+      kinds: new Map(hello.alarm_kinds.map((kind) => [kind.name, kind])),
+      /* Whether an alarm is about this one of the numbers shown. */
+      isAbout: (alarm, quantity) => run.kinds.get(alarm.name)?.quantity === quantity,
       columns: COLUMNS,
       history: Kept.ladder(COLUMNS * n, Math.max(1024, Math.min(KEPT_S * hello.update_hz, MOST_KEPT / n))),
       kept: Kept.samples(n, Math.min(MOST_SCOPE, Math.ceil(1.05 * hello.rate_hz * Math.max(hello.window_s, 4)) + 16)),

@@ -4,158 +4,13 @@
 //! below the limit by the hysteresis. A latched alarm is then held until it is reset. Readings without numbers neither raise nor end
 //! one, but they break off what had lasted; that an actuator has not been judged for long is an alarm of its own.
 
+mod config;
+mod kind;
+
 use rthstrack::Reading;
 
-/// The user's limits; `None` watches nothing.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AlarmConfig {
-    /// Largest |d|, in seconds.
-    pub limit_delay_s: Option<f64>,
-    /// Largest |A - 1|.
-    pub limit_amplitude: Option<f64>,
-    /// The delay at which the test becomes unstable, in seconds.
-    pub critical_delay_s: Option<f64>,
-    /// Largest share of it that a lag may reach.
-    pub critical_fraction: f64,
-    /// Most samples missing among those of the last window.
-    pub limit_lost: Option<u64>,
-    /// Longest time without a sample.
-    pub silence_s: Option<f64>,
-    /// Longest time in which samples came and an actuator that moves could not be judged.
-    pub unjudged_s: Option<f64>,
-    /// By what share of the limit a value must fall below it.
-    pub hysteresis: f64,
-    /// How long a value must be over the limit. Silence has its own time.
-    pub minimum_duration_s: f64,
-    /// Whether an alarm is held until it is reset.
-    pub latch: bool,
-}
-
-impl Default for AlarmConfig {
-    fn default() -> Self {
-        Self {
-            limit_delay_s: None,
-            limit_amplitude: None,
-            critical_delay_s: None,
-            critical_fraction: 0.5,
-            limit_lost: None,
-            silence_s: Some(1.0),
-            unjudged_s: None,
-            hysteresis: 0.1,
-            minimum_duration_s: 0.0,
-            latch: true,
-        }
-    }
-}
-
-impl AlarmConfig {
-    /// Everything that is wrong with it, a line each.
-    pub fn mistakes(&self) -> Vec<String> {
-        let mut found = Vec::new();
-        let mut positive = |name: &str, value: Option<f64>, what: &str| {
-            if let Some(value) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
-                found.push(format!("{name} must be a positive {what}, not {value}"));
-            }
-        };
-        positive("limit_delay_s", self.limit_delay_s, "duration in seconds");
-        positive("limit_amplitude", self.limit_amplitude, "number, the largest |A - 1|");
-        positive("critical_delay_s", self.critical_delay_s, "duration in seconds");
-        positive("critical_fraction", Some(self.critical_fraction), "share of the critical delay");
-        positive("silence_s", self.silence_s, "duration in seconds");
-        positive("unjudged_s", self.unjudged_s, "duration in seconds");
-        if !(0.0..1.0).contains(&self.hysteresis) {
-            found.push(format!("hysteresis must be a share of the limit from 0 to below 1, not {}", self.hysteresis));
-        }
-        if !(self.minimum_duration_s.is_finite() && self.minimum_duration_s >= 0.0) {
-            let value = self.minimum_duration_s;
-            found.push(format!("minimum_duration_s must be zero or a positive duration in seconds, not {value}"));
-        }
-        found
-    }
-}
-
-/// What an alarm watches.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// |d|.
-    Delay,
-    /// |A - 1|.
-    Amplitude,
-    /// d over the critical delay.
-    CriticalDelay,
-    /// Samples missing from the last window.
-    Lost,
-    /// Seconds without a sample.
-    Silence,
-    /// Seconds in which an actuator that moves was not judged.
-    Unjudged,
-}
-
-impl Kind {
-    /// All kinds, in the order of [`Kind::bit`].
-    pub const ALL: [Kind; 6] =
-        [Kind::Delay, Kind::Amplitude, Kind::CriticalDelay, Kind::Lost, Kind::Silence, Kind::Unjudged];
-
-    /// Its name on the wire.
-    pub fn name(self) -> &'static str {
-        match self {
-            Kind::Delay => "delay",
-            Kind::Amplitude => "amplitude",
-            Kind::CriticalDelay => "critical_delay",
-            Kind::Lost => "lost",
-            Kind::Silence => "silence",
-            Kind::Unjudged => "unjudged",
-        }
-    }
-
-    /// Its place in a set of alarms.
-    pub fn bit(self) -> u8 {
-        1 << self as u8
-    }
-
-    /// Of a valid reading, with its sign.
-    fn value_of(self, reading: &Reading, config: &AlarmConfig) -> Option<f64> {
-        match self {
-            Kind::Delay => Some(reading.tracking.delay_s),
-            Kind::Amplitude => Some(reading.tracking.amplitude - 1.0),
-            Kind::CriticalDelay => Some(reading.tracking.delay_s / config.critical_delay_s?),
-            Kind::Unjudged => Some(0.0),
-            Kind::Lost | Kind::Silence => None,
-        }
-    }
-
-    /// What is compared with the limit: a lead is as bad as a lag, but brings no structure nearer to its critical delay.
-    fn compared(self, value: f64) -> f64 {
-        match self {
-            Kind::Delay | Kind::Amplitude => value.abs(),
-            _ => value,
-        }
-    }
-
-    /// Of the value that goes farthest, with its sign.
-    fn words(self, value: f64, limit: f64) -> String {
-        match self {
-            Kind::Delay => {
-                let way = if value < 0.0 { "lead" } else { "lag" };
-                format!("{way} of up to {:.3} ms, limit {:.3} ms either way", 1e3 * value.abs(), 1e3 * limit)
-            }
-            Kind::Amplitude => {
-                let way = if value < 0.0 { "small" } else { "large" };
-                format!("amplitude {:.3}, too {way} by up to {:.3}, limit {limit:.3}", 1.0 + value, value.abs())
-            }
-            Kind::CriticalDelay => {
-                let (value, limit) = (100.0 * value, 100.0 * limit);
-                format!("delay is up to {value:.0} % of the critical delay, limit {limit:.0} %")
-            }
-            Kind::Lost => format!("up to {value} samples missing from the last window, limit {limit}"),
-            // Without the time, which would change all the while.
-            Kind::Silence => format!("no sample for more than {limit:.1} s"),
-            Kind::Unjudged => {
-                format!("moves, and has not been judged for more than {limit:.1} s: no other alarm sees it")
-            }
-        }
-    }
-}
+pub use config::{AlarmConfig, Range, Setting};
+pub use kind::{Kind, Observed, Row, Source};
 
 /// One alarm as it stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -204,12 +59,11 @@ impl Alarm {
 
     /// What it says, as advice.
     pub fn text(&self) -> String {
-        self.advice(&self.kind.words(self.value, self.limit))
+        self.kind.raised_text(self.actuator, self.value, self.limit)
     }
 
-    fn advice(&self, text: &str) -> String {
-        let whose = self.actuator.map_or_else(String::new, |a| format!("actuator {a}: "));
-        format!("advisory: {whose}{text}")
+    fn compared(&self, value: f64) -> f64 {
+        (self.kind.row().compared)(value)
     }
 
     /// Compares; tells whether it was raised or ended by this.
@@ -220,11 +74,11 @@ impl Alarm {
         }
         // What is held shows the value that it is held for.
         self.value = if self.latched { self.farther(value) } else { value };
-        if self.kind.compared(value) <= self.limit {
+        if self.compared(value) <= self.limit {
             self.pending_s = None;
             return false;
         }
-        let wait_s = if matches!(self.kind, Kind::Silence | Kind::Unjudged) { 0.0 } else { config.minimum_duration_s };
+        let wait_s = if self.kind.row().is_time { 0.0 } else { config.minimum_duration_s };
         let since_s = *self.pending_s.get_or_insert(time_s);
         // Half a nanosecond for what counting in binary fractions loses.
         if time_s - since_s < wait_s - 5e-10 {
@@ -239,7 +93,7 @@ impl Alarm {
     }
 
     fn farther(&self, value: f64) -> f64 {
-        if self.kind.compared(value) > self.kind.compared(self.value) { value } else { self.value }
+        if self.compared(value) > self.compared(self.value) { value } else { self.value }
     }
 
     /// A reading had no numbers: how long the value has been over its limit is not known.
@@ -250,7 +104,7 @@ impl Alarm {
 
     /// Tells whether it ended by this value.
     fn go_on(&mut self, value: f64, config: &AlarmConfig) -> bool {
-        if self.kind.compared(value) > self.limit * (1.0 - config.hysteresis) {
+        if self.compared(value) > self.limit * (1.0 - config.hysteresis) {
             self.value = self.farther(value);
             return false;
         }
@@ -284,16 +138,6 @@ pub struct Change {
     pub time_s: f64,
 }
 
-impl Change {
-    /// What happened, as advice.
-    pub fn text(&self) -> String {
-        if self.raised {
-            return self.alarm.text();
-        }
-        self.alarm.advice(&format!("alarm '{}' is over", self.alarm.kind.name()))
-    }
-}
-
 /// All alarms of a stream.
 #[derive(Debug, Clone)]
 pub struct Alarms {
@@ -304,18 +148,13 @@ pub struct Alarms {
 impl Alarms {
     /// The alarms that a configuration without mistakes asks for.
     pub fn new(config: AlarmConfig, n_actuators: usize) -> Self {
-        let mut alarms = Vec::new();
-        for actuator in 0..n_actuators {
-            let mut watch = |kind, limit: Option<f64>| {
-                alarms.extend(limit.map(|limit| Alarm::new(kind, Some(actuator), limit)));
-            };
-            watch(Kind::Delay, config.limit_delay_s);
-            watch(Kind::Amplitude, config.limit_amplitude);
-            watch(Kind::CriticalDelay, config.critical_delay_s.map(|_| config.critical_fraction));
-            watch(Kind::Unjudged, config.unjudged_s);
-        }
-        alarms.extend(config.limit_lost.map(|limit| Alarm::new(Kind::Lost, None, limit as f64)));
-        alarms.extend(config.silence_s.map(|limit| Alarm::new(Kind::Silence, None, limit)));
+        let watched = |is_of_actuators| {
+            let kinds = Kind::ALL.iter().filter(move |kind| kind.row().source.is_of_actuators() == is_of_actuators);
+            kinds.filter_map(move |kind| Some((*kind, (kind.row().limit)(&config)?)))
+        };
+        let of = |actuator| move |(kind, limit)| Alarm::new(kind, actuator, limit);
+        let of_actuators = (0..n_actuators).flat_map(|actuator| watched(true).map(of(Some(actuator))));
+        let alarms = of_actuators.chain(watched(false).map(of(None))).collect();
         Self { config, alarms }
     }
 
@@ -325,7 +164,7 @@ impl Alarms {
     }
 
     /// Which are raised for an actuator, and for the stream: the sum of their bits.
-    pub fn raised(&self, actuator: usize) -> u8 {
+    pub fn raised(&self, actuator: usize) -> u32 {
         let concerned = self.alarms.iter().filter(|a| a.is_raised() && a.actuator.is_none_or(|of| of == actuator));
         concerned.fold(0, |set, alarm| set | alarm.kind.bit())
     }
@@ -335,30 +174,30 @@ impl Alarms {
         if !reading.is_valid() {
             return self.break_off(Some(reading.actuator));
         }
-        let config = self.config;
-        self.compare(Some(reading.actuator), reading.time_s, |kind| kind.value_of(reading, &config), tell);
+        let (config, judged) = (self.config, Observed { unjudged_s: Some(0.0), ..Observed::default() });
+        let value = |source| match source {
+            Source::Reading(of) => Some(of(reading, &config)),
+            Source::Actuator(of) | Source::Stream(of) => of(&judged),
+        };
+        self.compare(Some(reading.actuator), reading.time_s, value, tell);
     }
 
     /// Nothing is known of an actuator now, or of any (`None`): its readings have no numbers, or there are none.
     pub fn break_off(&mut self, actuator: Option<usize>) {
-        let concerned =
-            |a: &&mut Alarm| a.kind != Kind::Unjudged && a.actuator.is_some_and(|of| actuator.is_none_or(|a| a == of));
+        let concerned = |a: &&mut Alarm| {
+            matches!(a.kind.row().source, Source::Reading(_))
+                && a.actuator.is_some_and(|of| actuator.is_none_or(|a| a == of))
+        };
         self.alarms.iter_mut().filter(concerned).for_each(Alarm::break_off);
     }
 
-    /// Compares for how long an actuator that moves has not been judged.
-    pub fn unjudged(&mut self, actuator: usize, time_s: f64, unjudged_s: f64, tell: impl FnMut(Change)) {
-        self.compare(Some(actuator), time_s, |kind| (kind == Kind::Unjudged).then_some(unjudged_s), tell);
-    }
-
-    /// Compares how many samples are missing from the last window.
-    pub fn count(&mut self, time_s: f64, lost: u64, tell: impl FnMut(Change)) {
-        self.compare(None, time_s, |kind| (kind == Kind::Lost).then_some(lost as f64), tell);
-    }
-
-    /// Compares how long nothing has come.
-    pub fn wait(&mut self, time_s: f64, silent_s: f64, tell: impl FnMut(Change)) {
-        self.compare(None, time_s, |kind| (kind == Kind::Silence).then_some(silent_s), tell);
+    /// Compares what is observed of an actuator, or of the stream (`None`).
+    pub fn observe(&mut self, actuator: Option<usize>, time_s: f64, observed: &Observed, tell: impl FnMut(Change)) {
+        let value = |source| match source {
+            Source::Reading(_) => None,
+            Source::Actuator(of) | Source::Stream(of) => of(observed),
+        };
+        self.compare(actuator, time_s, value, tell);
     }
 
     /// Ends what is held; what is over its limit goes on.
@@ -374,12 +213,12 @@ impl Alarms {
         &mut self,
         actuator: Option<usize>,
         time_s: f64,
-        value: impl Fn(Kind) -> Option<f64>,
+        value: impl Fn(Source) -> Option<f64>,
         mut tell: impl FnMut(Change),
     ) {
         for alarm in self.alarms.iter_mut().filter(|a| a.actuator == actuator) {
             // NaN compares as nothing.
-            let Some(value) = value(alarm.kind).filter(|v| !v.is_nan()) else { continue };
+            let Some(value) = value(alarm.kind.row().source).filter(|v| !v.is_nan()) else { continue };
             if alarm.compare(time_s, value, &self.config) {
                 tell(Change { alarm: *alarm, raised: alarm.active, time_s });
             }
@@ -518,11 +357,11 @@ pub(crate) mod tests {
 
     #[test]
     fn every_text_says_that_it_is_advisory() {
-        for kind in Kind::ALL {
+        for kind in Kind::ALL.iter().copied() {
             let alarm = Alarm { value: 2.0, active: true, ..Alarm::new(kind, Some(1), 1.0) };
             assert!(alarm.text().starts_with("advisory: actuator 1: "), "{}", alarm.text());
-            let over = Change { alarm, raised: false, time_s: 0.0 };
-            assert!(over.text().contains("advisory") && over.text().contains(kind.name()));
+            let over = kind.over_text(Some(1));
+            assert!(over.starts_with("advisory: actuator 1: ") && over.contains(kind.name()));
         }
     }
 
@@ -531,8 +370,9 @@ pub(crate) mod tests {
         let config = AlarmConfig { limit_amplitude: Some(0.1), limit_lost: Some(3), ..AlarmConfig::default() };
         let mut alarms = Alarms::new(config, 2);
         alarms.read(&reading(1, 1.0, 1.2, 0.0), |_| ());
-        alarms.count(1.0, 4, |_| ());
-        alarms.wait(1.0, 0.5, |_| panic!("not silent yet"));
+        alarms.observe(None, 1.0, &Observed { lost: Some(4), ..Observed::default() }, |_| ());
+        let waited = Observed { silent_s: Some(0.5), ..Observed::default() };
+        alarms.observe(None, 1.0, &waited, |_| panic!("not silent yet"));
         assert_eq!(alarms.raised(0), Kind::Lost.bit());
         assert_eq!(alarms.raised(1), Kind::Lost.bit() | Kind::Amplitude.bit());
     }
