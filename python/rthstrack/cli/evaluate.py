@@ -27,16 +27,17 @@ from rthstrack.cli.arguments import (
 from rthstrack.cli.commands import COMMANDS
 from rthstrack.errors import RecordingError, RthstrackError, SettingError, SignalError
 from rthstrack.evaluation.factors import TOLERANCE
-from rthstrack.evaluation.results import json_ready
+from rthstrack.evaluation.results import NUMBERS, end_names, is_interval, json_ready
 from rthstrack.evaluation.settings import Settings
 from rthstrack.evaluation.tracking import Evaluator
 from rthstrack.recording.pairing import propose_pair
 from rthstrack.recording.reading import read_recording
 from rthstrack.recording.recording import Recording
+from rthstrack.said import Said, coded
 from rthstrack.verdict import display
 from rthstrack.verdict.assessment import Assessment, assess, without_trusted
 from rthstrack.verdict.display import with_interval
-from rthstrack.verdict.entry import result_entry
+from rthstrack.verdict.entry import OF_TRUSTED, result_entry
 from rthstrack.verdict.limits import Limits
 from rthstrack.verdict.sentence import reason
 
@@ -104,7 +105,10 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
     if args.json:
         document = {
             "results": [result_entry(a) for a in assessments],
-            "failures": [{"file": file, "error": error} for file, error in failures],
+            "failures": [
+                {"file": file, "error": str(error), "code": error.code, "values": json_ready(error.values)}
+                for file, error in failures
+            ],
         }
         print(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False))
     else:
@@ -125,7 +129,7 @@ def assess_file(file: str, args: argparse.Namespace) -> list[Assessment]:
     """
     recording = read_recording(file, rate_hz=args.rate, time=args.time, resample_hz=args.resample)
     if recording.rate_hz is None:
-        raise RecordingError(f"{file}: no sampling rate: {recording.rate_source}; give --rate HZ or --time CHANNEL")
+        raise RecordingError(f"no sampling rate: {recording.rate_source}; give --rate HZ or --time CHANNEL", file=file)
     if args.target:
         pairs, proposal = list(zip(args.target, args.measured, strict=True)), None
     else:
@@ -133,7 +137,7 @@ def assess_file(file: str, args: argparse.Namespace) -> list[Assessment]:
     commands: Sequence[str | None] = args.command or [None] * len(pairs)
     if len(commands) != len(pairs):
         raise RecordingError(
-            f"{file}: {len(commands)} --command for {len(pairs)} proposed pairs: name each --target and --measured"
+            f"{len(commands)} --command for {len(pairs)} proposed pairs: name each --target and --measured", file=file
         )
     if args.fill:
         recording = recording.filled(args.fill)
@@ -194,15 +198,16 @@ def _assess(
             origin=origin,
         )
     except SignalError as error:
-        hint = " (--fill SAMPLES interpolates short gaps)" if "NaN" in str(error) and not args.fill else ""
+        hint = " (--fill SAMPLES interpolates short gaps)" if error.code == "not_finite" and not args.fill else ""
         channels = f"target '{asked.name}', measured '{answered.name}'"
-        raise SignalError(f"{recording.file}: {channels}: {error}{hint}") from None
+        raise error.reworded(f"{channels}: {error}{hint}").about(recording.file) from None
     except SettingError as error:
-        raise SettingError(f"{recording.file}: {error}") from None
+        raise error.about(recording.file) from None
     said = list(assessment.warnings)
     if proposal is not None and part == "whole":
-        said.insert(0, f"no channels were named: judged target '{asked.name}', measured '{answered.name}' ({proposal})")
-    said += recording.notes if part == "whole" else ()
+        words = f"no channels were named: judged target '{asked.name}', measured '{answered.name}' ({proposal})"
+        said.insert(0, Said(words, "channels_proposed"))
+    said += [coded(note, "note") for note in recording.notes] if part == "whole" else []
     return dataclasses.replace(assessment, warnings=tuple(said))
 
 
@@ -264,21 +269,20 @@ def _check(args: argparse.Namespace, misuse: Callable[[str], Any]) -> None:
             misuse(f"--{option}: there is no directory {path.parent}")
 
 
-def _evaluate_all(args: argparse.Namespace) -> tuple[list[list[Assessment]], list[tuple[str, str]]]:
+def _evaluate_all(args: argparse.Namespace) -> tuple[list[list[Assessment]], list[tuple[str, RthstrackError]]]:
     """All files, on all cores; one that fails does not stop the rest."""
 
-    def one(file: str) -> list[Assessment] | str:
+    def one(file: str) -> list[Assessment] | RthstrackError:
         try:
             return assess_file(file, args)
         except RthstrackError as error:
-            message = str(error)
-            return message if message.startswith(file) else f"{file}: {message}"
+            return error.about(file)
         except MemoryError:
-            return f"{file}: does not fit into memory"
+            return RecordingError("does not fit into memory", file=file, code="memory")
 
     files = args.files
     if len(files) == 1:
-        found: Iterable[list[Assessment] | str] = [one(files[0])]
+        found: Iterable[list[Assessment] | RthstrackError] = [one(files[0])]
     else:
         from concurrent.futures import ThreadPoolExecutor
 
@@ -286,7 +290,7 @@ def _evaluate_all(args: argparse.Namespace) -> tuple[list[list[Assessment]], lis
             found = list(_with_progress(pool.map(one, files), len(files)))
     results, failures = [], []
     for file, outcome in zip(files, found, strict=True):
-        if isinstance(outcome, str):
+        if isinstance(outcome, RthstrackError):
             failures.append((file, outcome))
         else:
             results.append(outcome)
@@ -344,21 +348,18 @@ def _flat(entry: dict[str, Any], before: str = "") -> dict[str, Any]:
     for key, value in entry.items():
         if isinstance(value, dict):
             row |= _flat(value, f"{before}{key}.")
-        elif "interval" in key:
-            stem, unit = (key[:-2], "_s") if key.endswith("_s") else (key, "")
-            row |= dict(
-                zip((f"{before}{stem}_low{unit}", f"{before}{stem}_high{unit}"), value or ("", ""), strict=True)
-            )
+        elif is_interval(key):
+            row |= {before + end: one for end, one in zip(end_names(key), value or ("", ""), strict=True)}
+        elif key == "warning_codes":
+            row[before + key] = "; ".join(warning["code"] for warning in value)
         else:
             row[before + key] = "; ".join(map(str, value)) if isinstance(value, list | tuple) else value
     return row
 
 
-_READING = (
-    "amplitude", "delay_s", "phase_rad", "equivalent_frequency_hz", "valid", "amplitude_std", "amplitude_interval",
-    "delay_std_s", "delay_interval_s", "residual_coherence", "goodness", "reason",
-)  # fmt: skip
-_TRUSTED_READING = ("amplitude", "delay_s", "valid", "amplitude_interval", "delay_interval_s", "reason")
+_REASON = ("reason", "reason_code", "reason_values")
+_READING = (*NUMBERS[:4], "valid", *(name for name in NUMBERS[4:] if name not in OF_TRUSTED), *_REASON)
+_TRUSTED_READING = ("amplitude", "delay_s", "valid", "amplitude_interval", "delay_interval_s", *_REASON)
 
 
 def _readings(a: Assessment) -> Iterable[dict[str, Any]]:
@@ -370,7 +371,7 @@ def _readings(a: Assessment) -> Iterable[dict[str, Any]]:
         trusted = {f"trusted_{name}": json_ready(getattr(a.trusted_moving, name)[i]) for name in _TRUSTED_READING}
         for name, value in (row | trusted).items():
             # No interval is no pair of missing ends.
-            if "interval" in name and None in value:
+            if is_interval(name.removeprefix("trusted_")) and None in value:
                 (row if name in row else trusted)[name] = None
         yield _flat(about | {"time_s": a.start_s + float(time_s)} | row | trusted)
 
@@ -494,8 +495,11 @@ def _most_frequent(moving: MovingTracking) -> str:
 
 def _reason_rows(a: Assessment) -> list[tuple[str, str]]:
     """Why a number or an interval is missing, each reason once."""
-    reasons = dict.fromkeys(filter(None, (reason(a.tracking), reason(a.trusted))))
-    return [(what, why) for what, _, why in (text.partition(": ") for text in reasons)]
+    rows = {}
+    for t in (a.tracking, a.trusted):
+        if why := reason(t):
+            rows[why] = ("not determined" if math.isnan(float(t.delay_s)) else "no interval", why.cause)
+    return list(rows.values())
 
 
 def _moving_rows(a: Assessment) -> list[tuple[str, str]]:

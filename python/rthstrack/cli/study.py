@@ -252,8 +252,7 @@ def _read_all(args: argparse.Namespace) -> tuple[list[Pair], list[tuple[str, str
                 end_s=args.end,
             )
         except RthstrackError as error:
-            message = str(error)
-            return message if message.startswith(file) else f"{file}: {message}"
+            return str(error.about(file))
         except MemoryError:
             return f"{file}: does not fit into memory"
 

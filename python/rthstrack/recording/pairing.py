@@ -109,15 +109,16 @@ def propose_pair(recording: Recording) -> tuple[list[tuple[str, str]], str]:
     elif any(one.role for one in named):
         roles = ", ".join(f"'{channels[one.index].name}' ({one.role})" for one in named if one.role)
         raise ChannelError(
-            f"{recording.file}: no likely target/measured pair: found only {roles}; "
-            "name them with --target and --measured"
+            f"no likely target/measured pair: found only {roles}; name them with --target and --measured",
+            file=recording.file,
         )
     else:
         guess = _by_likeness(recording, named)
         if guess is None:
             raise ChannelError(
-                f"{recording.file}: no likely target/measured pair: no name says target, command, measured or "
-                "feedback, and no two channels move alike; name them with --target and --measured"
+                "no likely target/measured pair: no name says target, command, measured or "
+                "feedback, and no two channels move alike; name them with --target and --measured",
+                file=recording.file,
             )
         (target, measured), correlation, lag = guess
         pairs = [(target, measured)]
@@ -190,8 +191,8 @@ def _by_name(named: list[_Named], channels: tuple[Channel, ...], file: str) -> l
             if not pairs:
                 listed = ", ".join(f"'{channels[one.index].name}'" for one in (*targets, *measured))
                 raise ChannelError(
-                    f"{file}: several channels could be target or measured: {listed}; "
-                    "choose with --target and --measured"
+                    f"several channels could be target or measured: {listed}; choose with --target and --measured",
+                    file=file,
                 )
             return [(t, m) for t, m in pairs if len(channels[t].values) == len(channels[m].values)] or pairs
     return []

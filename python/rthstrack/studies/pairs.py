@@ -53,7 +53,7 @@ class Pair:
         try:
             evaluate(target, measured, rate_hz)
         except SignalError as error:
-            raise SignalError(f"{self.name}: {error}" if self.name else str(error)) from None
+            raise error.about(self.name) from None
         for name, value in (("target", target), ("measured", measured), ("rate_hz", rate_hz)):
             object.__setattr__(self, name, value)
 
@@ -86,7 +86,7 @@ def read_pairs(
     recording = read_recording(file, rate_hz=rate_hz, time=time, resample_hz=resample_hz)
     sampled_hz = recording.rate_hz
     if sampled_hz is None:
-        raise RecordingError(f"{file}: no sampling rate: {recording.rate_source}; give --rate HZ or --time CHANNEL")
+        raise RecordingError(f"no sampling rate: {recording.rate_source}; give --rate HZ or --time CHANNEL", file=file)
     if targets or measured:
         if len(targets) != len(measured):
             raise SettingError(f"one measured for each target is needed, found {len(measured)} for {len(targets)}")

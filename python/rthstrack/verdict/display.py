@@ -6,8 +6,7 @@ Nothing here changes a result; every function only chooses how a result is shown
 from __future__ import annotations
 
 import math
-import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -81,12 +80,11 @@ def with_interval(value: float, interval: Sequence[float], unit: str = "") -> st
 
 def reasons(moving: MovingTracking) -> list[tuple[int, str]]:
     """Why windows have no number or no interval: how many of each kind, most frequent first, and the first's words."""
-    kinds: dict[str, tuple[int, str]] = {}
-    for reason in moving.reason:
-        if reason:
-            kind = re.sub(r"-?\d[\d.]*", "", str(reason))
-            count, first = kinds.get(kind, (0, str(reason)))
-            kinds[kind] = (count + 1, first)
+    kinds: dict[Any, tuple[int, str]] = {}
+    for code, reason in zip(moving.reason_code, moving.reason, strict=True):
+        if code:
+            count, first = kinds.get(code, (0, str(reason)))
+            kinds[code] = (count + 1, first)
     return sorted(kinds.values(), key=lambda found: -found[0])
 
 
