@@ -403,14 +403,13 @@ def _print_one(console: Console, a: Assessment) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    t, i = a.tracking, a.indices
+    t = a.tracking
     which = f"actuator {a.actuator}: " if a.actuator else ""
     console.print(Text(f"{which}{_PARTS[a.part]}{a.verdict}", style="bold"))
     console.print(Text(a.argument))
     for text in a.exceeded:
         console.print(Text(f"limit exceeded: {text}", style="bold red"))
     console.print(_side_by_side(a))
-    unit = f" {a.unit}" if a.unit else ""
     table = Table(box=None, show_header=False, pad_edge=False)
     table.add_column(style="dim", no_wrap=True)
     table.add_column(overflow="fold")
@@ -424,10 +423,7 @@ def _print_one(console: Console, a: Assessment) -> None:
         *([("P and Q chosen", a.factors.sentence)] if a.factors else []),
         *([("a larger Q", a.factors.windowed.sentence)] if a.factors and a.factors.windowed else []),
         *_moving_rows(a),
-        ("max tracking error", f"{i.max_tracking_error:.4g}{unit} ({i.max_tracking_error_percent:.3g} %)"),
-        ("rms error", f"{i.rms_error:.4g}{unit} ({i.rms_error_percent:.3g} %)"),
-        ("tracking indicator", f"{i.tracking_indicator:.4g}" + (f"{unit}^2" if unit else "")),
-        ("J1, J2, J3", f"{1e3 * i.j1_s:.4g} ms, {i.j2_percent:.3g} %, {i.j3_percent:.3g} %"),
+        *_index_rows(a),
     ):
         table.add_row(label, Text(value))
     console.print(table)
@@ -500,6 +496,20 @@ def _reason_rows(a: Assessment) -> list[tuple[str, str]]:
         if why := reason(t):
             rows[why] = ("not determined" if math.isnan(float(t.delay_s)) else "no interval", why.cause)
     return list(rows.values())
+
+
+def _index_rows(a: Assessment) -> list[tuple[str, str]]:
+    """The indices that there are, those of one name in one row."""
+    own = {"unit": a.unit, "unit2": f"{a.unit}^2" if a.unit else None}
+    rows: dict[str, list[str]] = {}
+    for _, field, unit, scale, percent, _, name in display.INDICES:
+        value = getattr(a.indices, field)
+        if value is None:
+            continue
+        text = f"{scale * value:{'.3g' if unit == '%' else '.4g'}} {own.get(unit, unit) or ''}".rstrip()
+        beside = "" if percent is None else f" ({getattr(a.indices, percent):.3g} %)"
+        rows.setdefault(name, []).append(text + beside)
+    return [(name, ", ".join(texts)) for name, texts in rows.items()]
 
 
 def _moving_rows(a: Assessment) -> list[tuple[str, str]]:
