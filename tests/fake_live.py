@@ -171,7 +171,9 @@ class FakeLive:
             "amplitude_interval": np.tile([0.4, 0.6], (n, 1)),
             "delay_interval_s": np.full((n, 2), np.nan),
             "valid": np.ones(n, np.bool_),
-            "reason": [None] * n,
+            "reason": [""] * n,
+            "reason_code": [""] * n,
+            "reason_values": [()] * n,
             **{name: np.full(n, 3, np.int64) for name in ("received", "lost", "repeated", "reordered", "malformed")},
             "alarms": ["delay"] * n,
         }

@@ -19,11 +19,11 @@ KEYS = {
     "file", "actuator", "target", "measured", "unit", "rate_hz", "n_samples", "amplitude", "delay_s", "phase_rad",
     "equivalent_frequency_hz", "n_bins", "delta_f_hz", "settings", "indices", "warnings", "amplitude_std",
     "amplitude_interval", "delay_std_s", "delay_interval_s", "residual_coherence", "goodness", "reason", "trusted",
-    "slopes", "depends_on", "dependence", "argument",
+    "slopes", "depends_on", "dependence", "argument", "reason_code", "reason_values", "warning_codes",
 }  # fmt: skip
 TRUSTED = {
     "estimator", "amplitude", "amplitude_interval", "delay_s", "delay_interval_s", "target_noise_std", "bad_samples",
-    "reason",
+    "reason", "reason_code", "reason_values",
 }  # fmt: skip
 INDICES = {
     "max_tracking_error", "max_tracking_error_percent", "rms_error", "rms_error_percent", "tracking_indicator", "j1_s",

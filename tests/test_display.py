@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import itertools
+from typing import Any
 
 import numpy as np
 import pytest
 
+from rthstrack.evaluation.results import NUMBERS
 from rthstrack.evaluation.settings import Settings
 from rthstrack.evaluation.tracking import Tracking
 from rthstrack.verdict import display
@@ -85,7 +87,10 @@ def test_the_frequencies_shown_first_hold_the_weight_and_stay_within_the_bins() 
     weights = np.zeros(1000)
     weights[19:50] = 1 / 31  # 2 to 5 Hz
     numbers = (1.0, 0.0, 0.0, 3.5, 1 + 0j, 1000, 0.1, 200.0, 2000)
-    tracking = Tracking(*numbers, Settings(), frequency_hz=frequency, weights=weights)
+    numbers: Any = dict.fromkeys(NUMBERS, float("nan"))
+    numbers |= {"equivalent_frequency_hz": 3.5, "frequency_hz": frequency, "weights": weights}
+    about: Any = {"fei": 1 + 0j, "n_bins": 1000, "delta_f_hz": 0.1, "rate_hz": 200.0, "n_samples": 2000}
+    tracking = Tracking(**numbers, **about, settings=Settings())
     low, high = display.judged_range(tracking) or (0.0, 0.0)
     assert frequency[0] <= low < 2.0
     assert 5.0 < high <= frequency[-1]

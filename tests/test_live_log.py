@@ -80,13 +80,15 @@ def test_every_sample_and_reading_is_in_the_log_with_units_rate_and_settings(tmp
     assert readings.num_rows == live.reading > 0
     assert readings.column_names == [
         "index", "time_s", "centre_s", "actuator", "amplitude", "delay_s", "phase_rad", "equivalent_frequency_hz",
-        "amplitude_low", "amplitude_high", "delay_low_s", "delay_high_s", "valid", "reason", "received", "lost",
+        "amplitude_low", "amplitude_high", "delay_low_s", "delay_high_s", "valid", "reason", "reason_code",
+        "reason_values", "received", "lost",
         "repeated", "reordered", "malformed", "alarms",
     ]  # fmt: skip
     assert readings.slice(0, 1).to_pylist()[0] | {"delay_low_s": None, "delay_high_s": None} == {
         "index": 0, "time_s": 0.0, "centre_s": -2.0, "actuator": 0, "amplitude": 0.5, "delay_s": 0.5, "phase_rad": 0.5,
         "equivalent_frequency_hz": 0.5, "amplitude_low": 0.4, "amplitude_high": 0.6, "delay_low_s": None,
-        "delay_high_s": None, "valid": True, "reason": None, "received": 3, "lost": 3, "repeated": 3, "reordered": 3,
+        "delay_high_s": None, "valid": True, "reason": None, "reason_code": None, "reason_values": [],
+        "received": 3, "lost": 3, "repeated": 3, "reordered": 3,
         "malformed": 3, "alarms": "delay",
     }  # fmt: skip
     assert live.log == [("writing", None)]

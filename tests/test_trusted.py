@@ -321,6 +321,8 @@ def test_json_and_csv_hold_the_trusted_numbers(capsys: pytest.CaptureFixture[str
         "target_noise_std": 0.0,
         "bad_samples": [],
         "reason": None,
+        "reason_code": None,
+        "reason_values": [],
     }
     low, high = result["trusted"]["delay_interval_s"]
     # Twice the interval: that chance alone takes the truth out of it happens once in 10,000 noises.

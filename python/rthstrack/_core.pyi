@@ -1,6 +1,6 @@
 """The compiled core. Use the functions of `rthstrack`, which check and convert what they are given."""
 
-from typing import Any, TypedDict, final
+from typing import Any, Literal, TypedDict, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,7 @@ from rthstrack.evaluation.settings import MonitorSettings, MovingSettings, Setti
 from rthstrack.virtual_test import parts as virtual_test
 
 __all__ = [
+    "LIVE_NUMBERS",
     "Evaluator",
     "KeyFrequencies",
     "Live",
@@ -36,17 +37,48 @@ __all__ = [
     "unit",
 ]
 
-_Averaged = tuple[float, float, float, float, complex]
-_Bad = list[tuple[str, str, int, int, int]]
-_Precision = tuple[float, tuple[float, float], float, tuple[float, float], float, float, float, _Bad, str]
-_Numbers = tuple[_Averaged, _Precision]
 _Array = NDArray[np.float64]
-_Readings = tuple[
-    tuple[_Array, _Array, _Array, _Array, _Array, NDArray[np.bool_]],
-    tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array, _Bad, list[str]],
-]
-_Spectra = tuple[_Array, _Array, NDArray[np.complex128], NDArray[np.complex128]]
+_Whole = NDArray[np.uint64]
+_Interval = tuple[float, float]
 
+class _BadEntry(TypedDict):
+    channel: str
+    kind: str
+    count: int
+    first: int
+    every: int
+
+class _Found(TypedDict):
+    numbers: dict[str, Any]  # by the names of rthstrack.evaluation.results._Numbers
+    fei: complex
+    bad_samples: list[_BadEntry]
+    reason: str
+    reason_code: str
+    reason_values: tuple[float, ...]
+
+class _Spectra(TypedDict):
+    frequency_hz: _Array
+    weights: _Array
+    target_spectrum: NDArray[np.complex128]
+    measured_spectrum: NDArray[np.complex128]
+
+class _Columns(TypedDict):
+    time_s: _Array
+    numbers: dict[str, _Array]  # by the same names; intervals are (n, 2)
+    valid: NDArray[np.bool_]
+    reason: list[str]
+    reason_code: list[str]
+    reason_values: list[tuple[float, ...]]
+
+class _Moving(_Columns):
+    bad_samples: list[_BadEntry]
+
+class _Readings(_Columns):
+    index: NDArray[np.int64]
+    centre_s: _Array
+    actuator: NDArray[np.int64]
+
+LIVE_NUMBERS: tuple[str, ...]
 __version__: str
 
 class SettingRow(TypedDict):
@@ -74,16 +106,8 @@ class Evaluator:
     def n_bins(self) -> int: ...
     @property
     def delta_f_hz(self) -> float: ...
-    def evaluate(self, target: NDArray[Any], measured: NDArray[Any]) -> list[_Numbers]: ...
-    def evaluate_with_spectra(
-        self, target: NDArray[Any], measured: NDArray[Any]
-    ) -> list[tuple[_Numbers, _Spectra]]: ...
-
-_Columns = tuple[
-    tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]],
-    tuple[_Array, _Array, _Array, _Array, _Array, _Array],
-    tuple[_Array, _Array, list[str]],
-]
+    def evaluate(self, target: NDArray[Any], measured: NDArray[Any]) -> list[_Found]: ...
+    def evaluate_with_spectra(self, target: NDArray[Any], measured: NDArray[Any]) -> list[tuple[_Found, _Spectra]]: ...
 
 @final
 class Monitor:
@@ -98,16 +122,42 @@ class Monitor:
     def evaluated_rate_hz(self) -> float: ...
     @property
     def samples_until_reading(self) -> int: ...
-    def process(self, target: _Array, measured: _Array) -> _Columns: ...
+    @property
+    def no_readings(self) -> _Readings: ...
+    def process(self, target: _Array, measured: _Array) -> _Readings | None: ...
     def restart(self, index: int) -> None: ...
 
-def bridged(
-    target: _Array, measured: _Array, rate_hz: float, settings: Settings
-) -> tuple[list[_Array], list[list[tuple[int, int]]]] | None: ...
+class _Bridged(TypedDict):
+    target: _Array
+    measured: _Array
+    target_gaps: _Whole  # (n, 2): from and to
+    measured_gaps: _Whole
+
+def bridged(target: _Array, measured: _Array, rate_hz: float, settings: Settings) -> _Bridged | None: ...
 def causal_decimate(samples: _Array, data_decimation: int) -> tuple[_Array, int]: ...
 
-_Whole = NDArray[np.uint64]
-_Changes = tuple[_Whole, _Whole, _Whole, _Array, _Array]
+class _Changes(TypedDict):
+    data_decimation: _Whole
+    frequency_decimation: _Whole
+    n_bins: _Whole
+    amplitude: _Array
+    delay: _Array
+
+_Measure = Literal["relative", "phase"]
+
+class _Factors(TypedDict):
+    data_decimation: int
+    frequency_decimation: int
+    amplitude_bound: float
+    delay_bound: float
+    delay_measure: _Measure
+    reference: _Found
+    changes: _Changes
+
+class _Bounds(TypedDict):
+    data: _Changes
+    frequency: _Changes
+    measure: _Measure
 
 @final
 class KeyFrequencies:
@@ -120,7 +170,7 @@ class KeyFrequencies:
     def direct(self) -> bool: ...
     @property
     def delta_f_hz(self) -> float: ...
-    def evaluate(self, target: NDArray[Any], measured: NDArray[Any]) -> _Numbers: ...
+    def evaluate(self, target: NDArray[Any], measured: NDArray[Any]) -> _Found: ...
 
 @final
 class Live:
@@ -151,25 +201,52 @@ def choose_factors(
     tolerance: float,
     data_decimation: int | None,
     frequency_decimation: int | None,
-) -> tuple[int, int, float, float, bool, _Numbers, _Changes]: ...
-def prior_bounds(
-    evaluator: Evaluator, target: NDArray[Any], measured: NDArray[Any]
-) -> tuple[_Changes, _Changes, bool]: ...
+) -> _Factors: ...
+def prior_bounds(evaluator: Evaluator, target: NDArray[Any], measured: NDArray[Any]) -> _Bounds: ...
 
 _Mistakes = list[tuple[str, str]]
-_Structure = tuple[tuple[_Array, _Array, _Array, _Array] | None, _Mistakes]
+
+class _Matrices(TypedDict):
+    mass_kg: _Array
+    damping_n_s_per_m: _Array
+    stiffness_n_per_m: _Array
+    natural_frequencies_hz: _Array
+
+_Structure = tuple[_Matrices | None, _Mistakes]
+
+class _Signals(TypedDict):
+    target: _Array
+    command: _Array
+    measured: _Array
+    force: _Array
+    displacement: _Array
+    steps_per_sample: int
+    error_estimate: float
+
+class _Critical(TypedDict):
+    delay_s: float
+    frequency_hz: float
+    gain: float
+    exact: bool
+
+class _Damped(TypedDict):
+    frequency_hz: _Array
+    damping_ratio: _Array
+    damping_ratio_without: _Array
+    first_order_change: _Array
 
 @final
 class VirtualTest:
     def __new__(cls, test: virtual_test.VirtualTest) -> VirtualTest: ...
+    # The signals, or when and at which bound it became unstable.
     def run(
         self, ground: NDArray[Any], noise: list[list[float] | None]
-    ) -> tuple[tuple[_Array, _Array, _Array, _Array, _Array, int, float] | None, tuple[float, float] | None]: ...
+    ) -> tuple[_Signals | None, tuple[float, float] | None]: ...
     def follow(
         self, target: NDArray[Any], noise: list[list[float] | None]
-    ) -> tuple[tuple[_Array, _Array, _Array, _Array, _Array, int, float] | None, tuple[float, float] | None]: ...
-    def critical_delay(self) -> tuple[float, float, float, bool]: ...
-    def delay_damping(self, delay_s: float) -> tuple[_Array, _Array, _Array, _Array]: ...
+    ) -> tuple[_Signals | None, tuple[float, float] | None]: ...
+    def critical_delay(self) -> _Critical: ...
+    def delay_damping(self, delay_s: float) -> _Damped: ...
     def true_response(self, actuator: int, frequency_hz: NDArray[Any]) -> NDArray[np.complex128] | None: ...
 
 def check_test(test: virtual_test.VirtualTest) -> _Mistakes: ...
@@ -188,26 +265,61 @@ def evaluate_moving(
     measured: NDArray[Any],
     rate_hz: float,
     settings: MovingSettings,
-) -> _Readings: ...
+) -> _Moving: ...
 
-_ResponseSettings = tuple[float | None, float, str, str, float | None, bool]
+class _ResponseSettings(TypedDict):
+    segment_s: float | None
+    overlap: float
+    window: str
+    detrend: str
+    align_s: float | None
+    dispersion: bool
+
+class _Response(TypedDict):
+    frequency_hz: _Array
+    gain: _Array
+    phase_rad: _Array
+    delay_s: _Array
+    coherence: _Array
+    target_psd: _Array
+    measured_psd: _Array
+    gain_std: _Array
+    gain_interval: _Array
+    delay_std_s: _Array
+    delay_interval_s: _Array
+    n_segments: int
+    segment_s: float
+    align_s: float
+    unaligned: str
 
 def frequency_response(
-    target: NDArray[Any],
-    measured: NDArray[Any],
-    rate_hz: float,
-    settings: _ResponseSettings,
-) -> tuple[
-    tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array],
-    tuple[_Array, _Array, _Array, _Array],
-    int,
-    float,
-    float,
-    str,
-]: ...
+    target: NDArray[Any], measured: NDArray[Any], rate_hz: float, settings: _ResponseSettings
+) -> _Response: ...
 
-_Interval = tuple[float, float]
-_Slope = tuple[float, float, _Interval, float, float, _Interval, float, bool]
+class _Slopes(TypedDict):
+    equivalent_frequency_hz: float
+    gain: float
+    gain_std: float
+    gain_interval: _Interval
+    gain_per_hz: float
+    gain_per_hz_std: float
+    gain_per_hz_interval: _Interval
+    gain_misfit: float
+    gain_varies: bool
+    delay_s: float
+    delay_std_s: float
+    delay_interval_s: _Interval
+    delay_s_per_hz: float
+    delay_s_per_hz_std: float
+    delay_s_per_hz_interval: _Interval
+    delay_misfit_s: float
+    delay_varies: bool
+    band_hz: _Interval
+    n_bins: int
+    align_s: float
+    dispersion: bool
+    n_segments: int
+    segment_s: float
 
 def frequency_slopes(
     target: NDArray[Any],
@@ -216,20 +328,27 @@ def frequency_slopes(
     band_hz: tuple[float, float] | None,
     keep_alignment: bool,
     settings: _ResponseSettings,
-) -> tuple[float, _Slope, _Slope, _Interval, int, float, bool, int, float]: ...
+) -> _Slopes: ...
 def indices(
     target: NDArray[Any],
     measured: NDArray[Any],
     rate_hz: float,
     force: NDArray[Any] | None,
     max_lag_s: float,
-) -> tuple[float, float, float, float, float, float, float, float, float | None]: ...
+) -> dict[str, float | None]: ...
+
+class _Histories(TypedDict):
+    max_tracking_error: _Array
+    rms_error: _Array
+    tracking_indicator: _Array
+    energy_error: _Array | None
+
 def index_histories(
     target: NDArray[Any],
     measured: NDArray[Any],
     rate_hz: float,
     force: NDArray[Any] | None,
-) -> tuple[_Array, _Array, _Array, _Array | None]: ...
+) -> _Histories: ...
 def read_text(content: bytes) -> dict[str, Any]: ...
 def unit(text: str) -> tuple[str, float] | None: ...
 def is_unit_suffix(text: str) -> bool: ...

@@ -9,7 +9,7 @@ import math
 import os
 import re
 import unicodedata
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Self
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -26,38 +26,90 @@ def printable(text: str) -> str:
 class RthstrackError(Exception):
     """Base class of every error that rthstrack raises on purpose.
 
-    `advice` says what to do; the arguments that it speaks of stand in braces, so that a command can name its options.
+    code: a name of its kind that never changes. values: what it says in numbers. file: of which file it speaks, which
+    its text begins with. words: its text without the file. `advice` says what to do; the arguments that it speaks of
+    stand in braces, so that a command can name its options.
     """
 
-    def __init__(self, *args: object, advice: str = "") -> None:
-        self.advice = advice
-        super().__init__(*args)
+    code = "error"
+    file = ""
+    values: tuple[float, ...] = ()
+    advice = ""
+
+    def __init__(
+        self,
+        *words: Any,
+        file: str | os.PathLike[str] = "",
+        code: str | None = None,
+        values: tuple[float, ...] | None = None,
+        advice: str = "",
+    ) -> None:
+        super().__init__(*words)
+        self.about(file)
+        if code is not None:
+            self.code = code
+        if values is not None:
+            self.values = values
+        if advice:
+            self.advice = advice
+
+    @property
+    def words(self) -> str:
+        """What is wrong, without the file."""
+        return self._advised({})
 
     def __str__(self) -> str:
-        return self.told({}) if self.advice else super().__str__()
+        return f"{self.file}: {self.words}" if self.file else self.words
 
-    def told(self, names: Mapping[str, str]) -> str:
+    def told(self, names: Mapping[str, str], *, with_file: bool = True) -> str:
         """The message with its advice, arguments called as `names` has them."""
         if not self.advice:
-            return str(self)
-        return f"{self.args[0]}; {re.sub(r'{(.*?)}', lambda found: names.get(found[1], found[1]), self.advice)}"
+            return str(self) if with_file else self.words
+        text = self._advised(names)
+        return f"{self.file}: {text}" if self.file and with_file else text
+
+    def _advised(self, names: Mapping[str, str]) -> str:
+        text = super().__str__()
+        if not self.advice:
+            return text
+        return f"{text}; {re.sub(r'{(.*?)}', lambda found: names.get(found[1], found[1]), self.advice)}"
+
+    def about(self, file: str | os.PathLike[str]) -> Self:
+        """The same error; it speaks of this file unless it speaks of one already."""
+        self.file = self.file or os.fspath(file)
+        return self
+
+    def reworded(self, words: str) -> Self:
+        """The same error in other words."""
+        self.args = (words,)
+        return self
 
 
 class SignalError(RthstrackError, ValueError):
     """The samples cannot be judged: lengths differ, NaN, constant target, too few samples."""
 
+    code = "signal"
+
 
 class SettingError(RthstrackError, ValueError):
     """A setting is not possible: P, Q, band, window, rate."""
+
+    code = "setting"
 
 
 class ConfigurationError(SettingError):
     """A configuration is wrong: `mistakes` are all (key, message), the text one line each, the file's name first."""
 
+    code = "configuration"
+
     def __init__(self, file: str | os.PathLike[str], mistakes: Iterable[tuple[str, str]]) -> None:
-        self.file = os.fspath(file)
         self.mistakes = tuple(mistakes)
-        super().__init__(self.file, self.mistakes)
+        super().__init__(os.fspath(file), self.mistakes, file=file)
+
+    @property
+    def words(self) -> str:
+        """A line a mistake."""
+        return "\n".join(": ".join(filter(None, mistake)) for mistake in self.mistakes)
 
     def __str__(self) -> str:
         return "\n".join(": ".join(filter(None, (self.file, *mistake))) for mistake in self.mistakes)
@@ -69,12 +121,16 @@ class UnstableError(RthstrackError):
     critical_delay_s: None where it is not known, infinite where no delay is too long.
     """
 
+    code = "unstable"
+
     def __init__(self, what: str, time_s: float, critical_delay_s: float | None = None) -> None:
         self.time_s = time_s
         self.critical_delay_s = critical_delay_s
-        super().__init__(what, time_s, critical_delay_s)
+        super().__init__(what, time_s, critical_delay_s, values=(time_s,))
 
-    def __str__(self) -> str:
+    @property
+    def words(self) -> str:
+        """When and why it left them, and what is known of the critical delay."""
         critical = self.critical_delay_s
         if critical is None:
             told = "its critical delay is not known"
@@ -92,6 +148,10 @@ class UnstableError(RthstrackError):
 class RecordingError(RthstrackError):
     """A file cannot be read as a recording, or what was asked of it is not in it."""
 
+    code = "recording"
+
 
 class ChannelError(RecordingError, LookupError):
     """A channel is unknown, ambiguous, or no target/measured pair can be proposed."""
+
+    code = "channel"

@@ -189,6 +189,47 @@ pub enum Error {
     },
 }
 
+impl Error {
+    /// Its name in programs, which never changes.
+    pub fn code(&self) -> &'static str {
+        self.told().0
+    }
+
+    /// What it says in numbers, in SI units.
+    pub fn values(&self) -> Vec<f64> {
+        self.told().1
+    }
+
+    fn told(&self) -> (&'static str, Vec<f64>) {
+        let counts = |counts: &[usize]| counts.iter().map(|n| *n as f64).collect();
+        match *self {
+            Error::Length { expected, found, .. } => ("length", counts(&[expected, found])),
+            Error::TooShort { expected, found } => ("too_short", counts(&[expected, found])),
+            Error::NotFinite { count, first, .. } => ("not_finite", counts(&[count, first])),
+            Error::ConstantTarget { value } => ("constant_target", vec![value]),
+            Error::Range { peak, weight_power, .. } => ("range", vec![peak, f64::from(weight_power)]),
+            Error::NoEnergy => ("no_energy", vec![]),
+            Error::FewBins { expected, found } => ("few_bins", counts(&[expected, found])),
+            Error::Rate { found } => ("rate", vec![found]),
+            Error::NotPowerOfTwo { found, .. } => ("not_power_of_two", counts(&[found])),
+            Error::NoBin { fft_len, data_decimation, frequency_decimation, .. } => {
+                ("no_bin", counts(&[fft_len, data_decimation, frequency_decimation]))
+            }
+            Error::Band { low_hz, high_hz } => ("band", vec![low_hz, high_hz]),
+            Error::Setting { found, .. } => ("setting", vec![found]),
+            Error::Value { .. } => ("value", vec![]),
+            Error::UnknownSetting { .. } => ("unknown_setting", vec![]),
+            Error::Combination { .. } => ("combination", vec![]),
+            Error::TooShortForChebyshev { expected, found } => ("too_short_for_chebyshev", counts(&[expected, found])),
+            Error::FactorsNeedSpectral => ("factors_need_spectral", vec![]),
+            Error::KeyFrequenciesNeedSpectral => ("key_frequencies_need_spectral", vec![]),
+            Error::Plan { expected, found } => ("plan", vec![expected.0 as f64, expected.1, found.0 as f64, found.1]),
+            Error::Configuration(_) => ("configuration", vec![]),
+            Error::Unstable { time_s, bound_m } => ("unstable", vec![time_s, bound_m]),
+        }
+    }
+}
+
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

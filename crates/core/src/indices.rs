@@ -6,27 +6,43 @@ use rustfft::FftPlanner;
 use crate::error::{Error, Result, Signal};
 use crate::pair::{Pair, check_finite, peak};
 
-/// One number each for the whole record. I is the target, O the measured displacement.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Indices {
+/// The indices, a row each: name and type, which is optional where an index is not always there.
+macro_rules! indices {
+    ($($(#[$doc:meta])* $name:ident: $type:ty;)+) => {
+        /// One number each for the whole record. I is the target, O the measured displacement.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct Indices {
+            $($(#[$doc])* pub $name: $type),+
+        }
+
+        impl Indices {
+            /// Each with its name.
+            pub fn named(&self) -> impl Iterator<Item = (&'static str, Option<f64>)> {
+                [$((stringify!($name), self.$name.into())),+].into_iter()
+            }
+        }
+    };
+}
+
+indices! {
     /// MTE = max |O - I|, in the signals' unit.
-    pub max_tracking_error: f64,
+    max_tracking_error: f64;
     /// 100 max |O - I| / max |I|.
-    pub max_tracking_error_percent: f64,
+    max_tracking_error_percent: f64;
     /// RMS = sqrt(mean (O - I)^2), in the signals' unit.
-    pub rms_error: f64,
+    rms_error: f64;
     /// 100 RMS / sqrt(mean I^2).
-    pub rms_error_percent: f64,
+    rms_error_percent: f64;
     /// TI at the end of the record, in unit^2 (Mercan 2007, sign so that it rises on lag); see [`index_histories`].
-    pub tracking_indicator: f64,
+    tracking_indicator: f64;
     /// J1 of the RTHS benchmark: lag of the correlation peak in whole samples, in seconds; positive when measured lags.
-    pub j1_s: f64,
+    j1_s: f64;
     /// J2 = 100 std(O - I) / std(I).
-    pub j2_percent: f64,
+    j2_percent: f64;
     /// J3 = 100 max |O - I| / max |I|.
-    pub j3_percent: f64,
+    j3_percent: f64;
     /// Work of the measured force over measured minus over target displacement; `None` without the force.
-    pub energy_error: Option<f64>,
+    energy_error: Option<f64>;
 }
 
 /// The indices that are histories, at every sample.

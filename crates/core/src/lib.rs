@@ -74,5 +74,5 @@ pub use reason::{Reason, ReasonKind};
 pub use response::{FrequencyResponse, ResponseConfig, Unaligned, frequency_response};
 pub use settings::{Estimator, EvaluatorConfig, Noise};
 pub use slopes::{FrequencySlopes, Slope, SlopesConfig, frequency_slopes};
-pub use tracking::{Spectra, Tracking};
+pub use tracking::{Getter, NumberKind, Spectra, Tracking};
 pub use window::{Detrend, Window};

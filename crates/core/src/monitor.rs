@@ -71,7 +71,7 @@ impl Reading {
 
     /// Whether there are numbers.
     pub fn is_valid(&self) -> bool {
-        !self.tracking.reason.is_some_and(|r| r.is_undetermined())
+        self.tracking.is_valid()
     }
 }
 

@@ -26,39 +26,15 @@ crate::configuration! {
     }
 }
 
-/// One entry a window. Where `valid` is false the target has too little energy to judge by, and the numbers are NaN.
+/// One entry a window, in order of time. What has too little energy to judge by says so.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MovingTracking {
     /// Centre of the window, in seconds from the first sample: (start + (W - 1) / 2) / rate.
     pub time_s: Vec<f64>,
-    /// A (Eq 11a).
-    pub amplitude: Vec<f64>,
-    /// phi, in radians (Eq 11b).
-    pub phase_rad: Vec<f64>,
-    /// d, in seconds (Eq 10); positive when measured lags.
-    pub delay_s: Vec<f64>,
-    /// f_eq, in hertz (Eq 7).
-    pub equivalent_frequency_hz: Vec<f64>,
-    /// Standard deviation of A; NaN of `fei`.
-    pub amplitude_std: Vec<f64>,
-    /// 95 % interval of A.
-    pub amplitude_interval: Vec<(f64, f64)>,
-    /// Standard deviation of d, in seconds.
-    pub delay_std_s: Vec<f64>,
-    /// 95 % interval of d, in seconds.
-    pub delay_interval_s: Vec<(f64, f64)>,
-    /// Coherence of the residual with the target.
-    pub residual_coherence: Vec<f64>,
-    /// Share of measured that one gain and one delay explain.
-    pub goodness: Vec<f64>,
-    /// Standard deviation of the noise that is the target's own, where it was taken into account.
-    pub target_noise: Vec<f64>,
+    /// The window's gain and delay.
+    pub tracking: Vec<Tracking>,
     /// Bad samples of the whole record, which are left out.
     pub bad_samples: BadFound,
-    /// Whether the window could be judged.
-    pub valid: Vec<bool>,
-    /// Why it could not, or why there is no interval.
-    pub reason: Vec<Option<Reason>>,
 }
 
 /// Evaluates windows of round(window_s rate) samples that start at 0, H, 2 H, ... with H = round(hop_s rate), at least one.
@@ -85,7 +61,12 @@ pub fn evaluate_moving(pair: &Pair<'_>, config: &MovingConfig) -> Result<MovingT
     let variance = RunningVariance::new(pair.target());
     let least = ratio * ratio * variance.of(0, n);
     let starts = (0..n - window + 1).step_by(hop);
-    let mut out = MovingTracking { bad_samples: moving.bad_samples(), ..MovingTracking::with_capacity(starts.len()) };
+    let n_windows = starts.len();
+    let mut out = MovingTracking {
+        time_s: Vec::with_capacity(n_windows),
+        tracking: Vec::with_capacity(n_windows),
+        bad_samples: moving.bad_samples(),
+    };
     for start in starts {
         let tracking = if variance.of(start, start + window) < least {
             Tracking::undetermined(Reason::Still)
@@ -96,48 +77,10 @@ pub fn evaluate_moving(pair: &Pair<'_>, config: &MovingConfig) -> Result<MovingT
                 Err(error) => return Err(error),
             }
         };
-        out.push((start as f64 + (window - 1) as f64 / 2.0) / rate_hz, &tracking);
+        out.time_s.push((start as f64 + (window - 1) as f64 / 2.0) / rate_hz);
+        out.tracking.push(tracking);
     }
     Ok(out)
-}
-
-impl MovingTracking {
-    fn with_capacity(n: usize) -> Self {
-        Self {
-            time_s: Vec::with_capacity(n),
-            amplitude: Vec::with_capacity(n),
-            phase_rad: Vec::with_capacity(n),
-            delay_s: Vec::with_capacity(n),
-            equivalent_frequency_hz: Vec::with_capacity(n),
-            amplitude_std: Vec::with_capacity(n),
-            amplitude_interval: Vec::with_capacity(n),
-            delay_std_s: Vec::with_capacity(n),
-            delay_interval_s: Vec::with_capacity(n),
-            residual_coherence: Vec::with_capacity(n),
-            goodness: Vec::with_capacity(n),
-            target_noise: Vec::with_capacity(n),
-            bad_samples: BadFound::NONE,
-            valid: Vec::with_capacity(n),
-            reason: Vec::with_capacity(n),
-        }
-    }
-
-    fn push(&mut self, time_s: f64, t: &Tracking) {
-        self.time_s.push(time_s);
-        self.amplitude.push(t.amplitude);
-        self.phase_rad.push(t.phase_rad);
-        self.delay_s.push(t.delay_s);
-        self.equivalent_frequency_hz.push(t.equivalent_frequency_hz);
-        self.amplitude_std.push(t.amplitude_std);
-        self.amplitude_interval.push(t.amplitude_interval);
-        self.delay_std_s.push(t.delay_std_s);
-        self.delay_interval_s.push(t.delay_interval_s);
-        self.residual_coherence.push(t.residual_coherence);
-        self.goodness.push(t.goodness);
-        self.target_noise.push(t.target_noise);
-        self.valid.push(!t.reason.is_some_and(|r| r.is_undetermined()));
-        self.reason.push(t.reason);
-    }
 }
 
 /// A duration in whole samples within `least..=most`.

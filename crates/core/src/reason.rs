@@ -37,7 +37,7 @@ macro_rules! reasons {
                 }
             }
 
-            /// What it says in numbers, in SI units; NaN where it says none.
+            /// What it says in numbers, in SI units, the rest NaN.
             #[allow(clippy::unnecessary_cast, reason = "one row counts samples")]
             pub fn values(&self) -> [f64; 2] {
                 match *self {
@@ -156,6 +156,11 @@ reasons! {
 }
 
 impl Reason {
+    /// The same without the rest.
+    pub fn told(&self) -> impl Iterator<Item = f64> {
+        self.values().into_iter().filter(|value| !value.is_nan())
+    }
+
     /// Whether there is no number either.
     pub fn is_undetermined(&self) -> bool {
         self.kind().number < 100

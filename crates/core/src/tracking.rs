@@ -7,62 +7,95 @@ use num_complex::Complex;
 use crate::bad_samples::BadFound;
 use crate::reason::Reason;
 
-/// Amplitude and delay of measured over target.
-///
-/// `fei` gives neither standard deviations nor intervals: its error is mostly bias. What could not be determined is NaN, and
-/// `reason` says why.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tracking {
-    /// sum O conj(I) |I|^(l-2) / sum |I|^l (Eq 12 without its quotient); A exp(j phi) of the other estimators.
-    pub fei: Complex<f64>,
+type Number = f64;
+type Interval = (f64, f64);
+
+/// Reads a number of a tracking, or both ends of an interval.
+#[derive(Debug, Clone, Copy)]
+pub enum Getter {
+    /// One number.
+    Number(fn(&Tracking) -> f64),
+    /// Lower and upper end.
+    Interval(fn(&Tracking) -> (f64, f64)),
+}
+
+/// What is known of a number of every [`Tracking`].
+#[derive(Debug, Clone, Copy)]
+pub struct NumberKind {
+    /// Its name in programs and files.
+    pub name: &'static str,
+    /// Whether the readings of a running test are written with it.
+    pub live: bool,
+    /// Reads it.
+    pub of: Getter,
+}
+
+/// The numbers, a row each: name, kind, what it is where nothing is determined, whether live readings are written with it.
+macro_rules! numbers {
+    ($($(#[$doc:meta])* $name:ident: $kind:ident = $nothing:expr, live: $live:literal;)+) => {
+        /// Amplitude and delay of measured over target.
+        ///
+        /// `fei` gives neither standard deviations nor intervals: its error is mostly bias. What could not be determined is
+        /// NaN, and `reason` says why.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct Tracking {
+            /// sum O conj(I) |I|^(l-2) / sum |I|^l (Eq 12 without its quotient); A exp(j phi) of the other estimators.
+            pub fei: Complex<f64>,
+            $($(#[$doc])* pub $name: $kind,)+
+            /// Bad samples that were found, by kind, and left out.
+            pub bad_samples: BadFound,
+            /// Why there is no number, or no interval.
+            pub reason: Option<Reason>,
+        }
+
+        impl Tracking {
+            /// All numbers, in the order in which they are written.
+            pub const NUMBERS: &'static [NumberKind] =
+                &[$(NumberKind { name: stringify!($name), live: $live, of: Getter::$kind(|t| t.$name) }),+];
+
+            /// Nothing but the reason.
+            pub(crate) const fn undetermined(reason: Reason) -> Self {
+                Self {
+                    fei: Complex::new(f64::NAN, f64::NAN),
+                    $($name: $nothing,)+
+                    bad_samples: BadFound::NONE,
+                    reason: Some(reason),
+                }
+            }
+        }
+    };
+}
+
+numbers! {
     /// A = |FEI| (Eq 11a); 1 is perfect.
-    pub amplitude: f64,
+    amplitude: Number = f64::NAN, live: true;
+    /// d = -phi / (2 pi f_eq), in seconds (Eq 10); positive when measured lags.
+    delay_s: Number = f64::NAN, live: true;
     /// phi = atan2(Im FEI, Re FEI), in radians (Eq 11b); negative on lag. NaN where measured is zero throughout. Of the other
     /// estimators -2 pi f_eq d, which may exceed half a turn.
-    pub phase_rad: f64,
-    /// d = -phi / (2 pi f_eq), in seconds (Eq 10); positive when measured lags.
-    pub delay_s: f64,
+    phase_rad: Number = f64::NAN, live: true;
     /// f_eq = sum f |I|^l / sum |I|^l, in hertz (Eq 7).
-    pub equivalent_frequency_hz: f64,
+    equivalent_frequency_hz: Number = f64::NAN, live: true;
     /// Standard deviation of A.
-    pub amplitude_std: f64,
+    amplitude_std: Number = f64::NAN, live: false;
     /// 95 % interval of A.
-    pub amplitude_interval: (f64, f64),
+    amplitude_interval: Interval = (f64::NAN, f64::NAN), live: true;
     /// Standard deviation of d, in seconds.
-    pub delay_std_s: f64,
+    delay_std_s: Number = f64::NAN, live: false;
     /// 95 % interval of d, in seconds.
-    pub delay_interval_s: (f64, f64),
+    delay_interval_s: Interval = (f64::NAN, f64::NAN), live: true;
     /// Coherence of the residual with the target, 0 to 1: what is left still follows the target, at other gains and delays.
-    pub residual_coherence: f64,
+    residual_coherence: Number = f64::NAN, live: false;
     /// 1 - sum (O - A I_d)^2 / sum (O - mean O)^2: the share of measured that one gain and one delay explain.
-    pub goodness: f64,
+    goodness: Number = f64::NAN, live: false;
     /// Standard deviation of the noise that is the target's own, in its unit, where it was taken into account; else 0.
-    pub target_noise: f64,
-    /// Bad samples that were found, by kind, and left out.
-    pub bad_samples: BadFound,
-    /// Why there is no number, or no interval.
-    pub reason: Option<Reason>,
+    target_noise_std: Number = 0.0, live: false;
 }
 
 impl Tracking {
-    /// Nothing but the reason.
-    pub(crate) const fn undetermined(reason: Reason) -> Self {
-        Self {
-            fei: Complex::new(f64::NAN, f64::NAN),
-            amplitude: f64::NAN,
-            phase_rad: f64::NAN,
-            delay_s: f64::NAN,
-            equivalent_frequency_hz: f64::NAN,
-            amplitude_std: f64::NAN,
-            amplitude_interval: (f64::NAN, f64::NAN),
-            delay_std_s: f64::NAN,
-            delay_interval_s: (f64::NAN, f64::NAN),
-            residual_coherence: f64::NAN,
-            goodness: f64::NAN,
-            target_noise: 0.0,
-            bad_samples: BadFound::NONE,
-            reason: Some(reason),
-        }
+    /// Whether gain and delay are determined.
+    pub fn is_valid(&self) -> bool {
+        !self.reason.is_some_and(|r| r.is_undetermined())
     }
 
     /// The numbers without their precision.

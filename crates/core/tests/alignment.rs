@@ -95,12 +95,12 @@ fn every_window_of_a_drifting_record_is_right() {
                 ..Default::default()
             };
             let moving = evaluate_moving(&Pair::new(&target, &measured, RATE_HZ).unwrap(), &config).unwrap();
-            assert!(moving.valid.iter().filter(|v| **v).count() > 30, "{:?}", moving.reason);
-            for (i, valid) in moving.valid.iter().enumerate() {
-                assert_eq!(*valid, moving.reason[i].is_none(), "{:?}", moving.reason[i]);
-                if *valid {
-                    assert!((moving.delay_s[i] - 0.005).abs() < 1e-7, "{i}: {}", moving.delay_s[i]);
-                    assert!((moving.amplitude[i] - GAIN).abs() < 1e-5, "{i}: {}", moving.amplitude[i]);
+            assert!(moving.tracking.iter().filter(|t| t.is_valid()).count() > 30, "{:?}", moving.tracking);
+            for (i, found) in moving.tracking.iter().enumerate() {
+                assert_eq!(found.is_valid(), found.reason.is_none(), "{:?}", found.reason);
+                if found.is_valid() {
+                    assert!((found.delay_s - 0.005).abs() < 1e-7, "{i}: {}", found.delay_s);
+                    assert!((found.amplitude - GAIN).abs() < 1e-5, "{i}: {}", found.amplitude);
                 }
             }
         }
@@ -163,11 +163,11 @@ fn intervals_cover_in_white_and_in_coloured_noise() {
                 })
                 .collect();
             let moving = evaluate_moving(&Pair::new(&target, &measured, RATE_HZ).unwrap(), &config).unwrap();
-            assert_eq!(moving.valid.len(), (8192 - n) / 2048 + 1);
+            assert_eq!(moving.tracking.len(), (8192 - n) / 2048 + 1);
             // The window in the middle has target on both sides.
-            let (low, high) = moving.delay_interval_s[1];
+            let (low, high) = moving.tracking[1].delay_interval_s;
             delays += usize::from(low <= 0.005 && 0.005 <= high);
-            let (low, high) = moving.amplitude_interval[1];
+            let (low, high) = moving.tracking[1].amplitude_interval;
             gains += usize::from(low <= GAIN && GAIN <= high);
             total += 1;
         }
@@ -242,7 +242,8 @@ fn of_delays_that_fit_equally_well_the_one_nearest_to_the_expected_is_taken() {
             let config = MovingConfig { window_s: 2.0, evaluator: config, ..Default::default() };
             let moving = evaluate_moving(&pair, &config).unwrap();
             // The delay's sign decides at which end a window has nothing of the record beside it.
-            assert!(moving.delay_s.iter().all(|d| (d - delay).abs() < 1e-6), "{expected}: {:?}", moving.delay_s);
+            let found = &moving.tracking;
+            assert!(found.iter().all(|t| (t.delay_s - delay).abs() < 1e-6), "{expected}: {found:?}");
         }
     }
 }
@@ -490,7 +491,7 @@ fn noise_on_the_target_draws_the_delay_to_no_fraction_of_a_sample() {
                     &noisy(delay_s, 0.95, &second),
                     EvaluatorConfig { detrend: Detrend::Mean, ..least_squares() },
                 );
-                assert!((found.target_noise / share - 1.0).abs() < 0.1, "{found:?}");
+                assert!((found.target_noise_std / share - 1.0).abs() < 0.1, "{found:?}");
                 error += (found.delay_s - delay_s) / DRAWS as f64;
                 square += (found.delay_s - delay_s).powi(2) / DRAWS as f64;
                 let (low, high) = found.delay_interval_s;
@@ -512,7 +513,7 @@ fn a_clean_target_is_taken_for_exact_and_so_is_a_high_motion_that_measured_follo
         let target: Vec<f64> = (0..n).map(|i| motion(i as f64 / RATE_HZ)).collect();
         let measured: Vec<f64> = (0..n).map(|i| 0.9 * motion(i as f64 / RATE_HZ - 0.0123) + 0.01 * errors[i]).collect();
         let found = evaluate(&target, &measured, least_squares());
-        assert_eq!(found.target_noise, 0.0, "{high_hz}");
+        assert_eq!(found.target_noise_std, 0.0, "{high_hz}");
         assert!((found.delay_s - 0.0123).abs() < 5.0 * found.delay_std_s, "{high_hz}: {found:?}");
     }
 }

@@ -85,7 +85,7 @@ fn evaluating_allocates_nothing() {
         let before = COUNT.with(Cell::get);
         let found = evaluator.evaluate(&mut state, &pair).unwrap();
         assert_eq!(COUNT.with(Cell::get), before, "{found:?}");
-        assert_eq!(found.target_noise > 0.0, own, "{found:?}");
+        assert_eq!(found.target_noise_std > 0.0, own, "{found:?}");
     }
     for (share, direct) in [(0.9, true), (0.99999, false)] {
         let evaluator = EvaluatorConfig::default();

@@ -205,8 +205,12 @@ fn moving_readings_are_those_of_their_windows_bit_for_bit() {
             let range = start..start + window;
             let alone = Pair::new(&target[range.clone()], &measured[range], RATE_HZ).unwrap();
             let expected = plan.evaluate(&mut state, &alone).unwrap();
-            assert_eq!(moving.delay_s[i].to_bits(), expected.delay_s.to_bits(), "{window} {hop} reading {i}");
-            assert_eq!(moving.amplitude[i].to_bits(), expected.amplitude.to_bits(), "{window} {hop} reading {i}");
+            assert_eq!(moving.tracking[i].delay_s.to_bits(), expected.delay_s.to_bits(), "{window} {hop} reading {i}");
+            assert_eq!(
+                moving.tracking[i].amplitude.to_bits(),
+                expected.amplitude.to_bits(),
+                "{window} {hop} reading {i}"
+            );
         }
     }
 }

@@ -131,11 +131,11 @@ fn each_reading_is_the_batch_evaluation_of_its_window_of_causally_decimated_samp
                 };
                 let pair = Pair::new(record_x, record_y, rate_hz).unwrap();
                 let moving = evaluate_moving(&pair, &moving).unwrap();
-                let i = moving.amplitude.len() - 1;
+                let i = moving.tracking.len() - 1;
+                let found = &moving.tracking[i];
                 assert!(same(moving.time_s[i] * rate_hz, start as f64 + 0.5 * (n - 1) as f64));
-                let numbers =
-                    [moving.amplitude[i], moving.delay_s[i], moving.phase_rad[i], moving.equivalent_frequency_hz[i]];
-                let intervals = [moving.amplitude_interval[i].0, moving.delay_interval_s[i].0];
+                let numbers = [found.amplitude, found.delay_s, found.phase_rad, found.equivalent_frequency_hz];
+                let intervals = [found.amplitude_interval.0, found.delay_interval_s.0];
                 assert_alike(reading, numbers, intervals, &context);
             }
         }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use rthstrack::{Reading, Reason};
+use rthstrack::{Getter, Reading, Reason, Tracking};
 
 use crate::alarm::{Alarm, Change};
 
@@ -76,15 +76,12 @@ pub(crate) fn displayed(out: &mut String, value: Option<&impl std::fmt::Display>
     }
 }
 
-/// A reason by its code and values, two keys that are null where there is none.
+/// A reason by its code, null where there is none, and what it says in numbers.
 pub(crate) fn reason(out: &mut String, reason: Option<&Reason>) {
     key(out, "reason_code");
     displayed(out, reason.map(|r| r.kind().code).as_ref());
     key(out, "reason_values");
-    match reason {
-        Some(reason) => list(out, reason.values(), number),
-        None => out.push_str("null"),
-    }
+    list(out, reason.into_iter().flat_map(Reason::told), number);
 }
 
 /// Items between brackets, with commas.
@@ -129,18 +126,13 @@ pub fn reading(out: &mut String, reading: &Reading) {
     number(out, reading.centre_s);
     key(out, "actuator");
     whole(out, reading.actuator as u64);
-    key(out, "amplitude");
-    number(out, t.amplitude);
-    key(out, "delay_s");
-    number(out, t.delay_s);
-    key(out, "phase_rad");
-    number(out, t.phase_rad);
-    key(out, "equivalent_frequency_hz");
-    number(out, t.equivalent_frequency_hz);
-    key(out, "amplitude_interval");
-    interval(out, t.amplitude_interval);
-    key(out, "delay_interval_s");
-    interval(out, t.delay_interval_s);
+    for kind in Tracking::NUMBERS.iter().filter(|kind| kind.live) {
+        key(out, kind.name);
+        match kind.of {
+            Getter::Number(of) => number(out, of(t)),
+            Getter::Interval(of) => interval(out, of(t)),
+        }
+    }
     key(out, "valid");
     boolean(out, reading.is_valid());
     key(out, "reason");
@@ -278,6 +270,13 @@ mod tests {
         assert_eq!(value["delay_interval_s"][1], 0.013);
         assert_eq!(value["valid"], true);
         assert_eq!(value["reason"], Value::Null);
+        assert_eq!(value["reason_code"], Value::Null);
+        assert_eq!(value["reason_values"], serde_json::json!([]));
+        one.tracking.reason = Some(Reason::Ambiguous { delay_s: 0.25, other_s: -0.125 });
+        let missing: Value = serde_json::from_str(&made(|o| reading(o, &one))).unwrap();
+        assert_eq!(missing["reason_code"], "ambiguous");
+        assert_eq!(missing["reason_values"], serde_json::json!([0.25, -0.125]));
+        one.tracking.reason = None;
         let row: Value = serde_json::from_str(&made(|o| reading_row(o, &one))).unwrap();
         assert_eq!(row.as_array().unwrap().len(), 14);
         assert_eq!(

@@ -3,6 +3,7 @@
 use numpy::{Complex64, IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ndarray::Array2};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use rthstrack::Error;
 use rthstrack::dynamics::{
     Actuator, BoucWen, Compensation, Converter, Damping, Delay, Dynamics, Element, Law, Mistake, Motion, Run,
@@ -10,17 +11,12 @@ use rthstrack::dynamics::{
 };
 
 use crate::error::{choice, to_py};
+use crate::named::named;
 
 /// (key, message)
 type Mistakes = Vec<(String, String)>;
-/// mass, damping, stiffness, natural frequencies
-type Matrices<'py> =
-    (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>);
-/// delay, frequency, gain, exact
-type Critical = (f64, f64, f64, bool);
-/// frequency, damping ratio with and without the delay, first-order change
-type Damped<'py> =
-    (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
+/// A structure's matrices, or everything that is wrong with it.
+type Built<'py> = (Option<Bound<'py, PyDict>>, Mistakes);
 
 fn pairs(mistakes: &[Mistake]) -> Mistakes {
     mistakes.iter().map(|m| (m.key.clone(), m.message.clone())).collect()
@@ -179,10 +175,7 @@ fn contiguous(_: impl std::fmt::Debug) -> PyErr {
     PyValueError::new_err("the array must be C-contiguous")
 }
 
-fn built<'py>(
-    py: Python<'py>,
-    structure: Result<Structure, Vec<Mistake>>,
-) -> PyResult<(Option<Matrices<'py>>, Mistakes)> {
+fn built<'py>(py: Python<'py>, structure: Result<Structure, Vec<Mistake>>) -> PyResult<Built<'py>> {
     let structure = match structure {
         Ok(structure) => structure,
         Err(mistakes) => return Ok((None, pairs(&mistakes))),
@@ -190,16 +183,14 @@ fn built<'py>(
     let n = structure.n_dof();
     let [m, c, k] =
         structure.matrices().map(|rows| Array2::from_shape_vec((n, n), rows).expect("n x n").into_pyarray(py));
-    Ok((Some((m, c, k, structure.natural_frequencies_hz().to_vec().into_pyarray(py))), Vec::new()))
+    let frequencies = structure.natural_frequencies_hz().to_vec();
+    let matrices = named!(py, (); ; mass_kg: m, damping_n_s_per_m: c, stiffness_n_per_m: k,
+        natural_frequencies_hz: frequencies)?;
+    Ok((Some(matrices), Vec::new()))
 }
 
 #[pyfunction]
-fn sdof(
-    py: Python<'_>,
-    frequency_hz: f64,
-    damping_ratio: f64,
-    mass_kg: f64,
-) -> PyResult<(Option<Matrices<'_>>, Mistakes)> {
+fn sdof(py: Python<'_>, frequency_hz: f64, damping_ratio: f64, mass_kg: f64) -> PyResult<Built<'_>> {
     built(py, Structure::sdof(frequency_hz, damping_ratio, mass_kg))
 }
 
@@ -209,7 +200,7 @@ fn shear_building<'py>(
     masses_kg: Vec<f64>,
     stiffnesses: Vec<f64>,
     damped: &Bound<'py, PyAny>,
-) -> PyResult<(Option<Matrices<'py>>, Mistakes)> {
+) -> PyResult<Built<'py>> {
     built(py, Structure::shear_building(&masses_kg, &stiffnesses, &damping(damped)?))
 }
 
@@ -220,7 +211,7 @@ fn from_matrices<'py>(
     stiffness: PyReadonlyArray2<'py, f64>,
     damped: &Bound<'py, PyAny>,
     influence: Vec<f64>,
-) -> PyResult<(Option<Matrices<'py>>, Mistakes)> {
+) -> PyResult<Built<'py>> {
     let n = mass.as_array().nrows();
     let (mass, stiffness) = (mass.as_slice().map_err(contiguous)?, stiffness.as_slice().map_err(contiguous)?);
     built(py, Structure::from_matrices(n, mass, stiffness, &damping(damped)?, Some(&influence)))
@@ -282,19 +273,8 @@ struct VirtualTest {
     plan: rthstrack::dynamics::VirtualTest,
 }
 
-/// target, command, measured, force, displacement, steps a sample, error estimate
-type Signals<'py> = (
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray2<f64>>,
-    usize,
-    f64,
-);
-
 /// The signals, or when and at which bound the test became unstable.
-type Outcome<'py> = (Option<Signals<'py>>, Option<(f64, f64)>);
+type Outcome<'py> = (Option<Bound<'py, PyDict>>, Option<(f64, f64)>);
 
 fn outcome<'py>(py: Python<'py>, run: rthstrack::Result<Run>) -> PyResult<Outcome<'py>> {
     let run = match run {
@@ -303,15 +283,10 @@ fn outcome<'py>(py: Python<'py>, run: rthstrack::Result<Run>) -> PyResult<Outcom
         Err(error) => return Err(to_py(py, &error)),
     };
     let n_samples = run.target.first().map_or(0, Vec::len);
-    let signals = (
-        columns(py, &run.target, n_samples),
-        columns(py, &run.command, n_samples),
-        columns(py, &run.measured, n_samples),
-        columns(py, &run.force, n_samples),
-        columns(py, &run.displacement, n_samples),
-        run.steps_per_sample,
-        run.error_estimate,
-    );
+    let signal = |of: &[Vec<f64>]| columns(py, of, n_samples);
+    let signals = named!(py, run; steps_per_sample, error_estimate;
+        target: signal(&run.target), command: signal(&run.command), measured: signal(&run.measured),
+        force: signal(&run.force), displacement: signal(&run.displacement))?;
     Ok((Some(signals), None))
 }
 
@@ -350,19 +325,14 @@ impl VirtualTest {
         outcome(py, py.detach(|| self.plan.follow(&target, &noise)))
     }
 
-    fn critical_delay(&self, py: Python<'_>) -> PyResult<Critical> {
+    fn critical_delay<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let found = self.plan.critical_delay().map_err(|e| to_py(py, &e))?;
-        Ok((found.delay_s, found.frequency_hz, found.gain, found.exact))
+        named!(py, found; delay_s, frequency_hz, gain, exact)
     }
 
-    fn delay_damping<'py>(&self, py: Python<'py>, delay_s: f64) -> PyResult<Damped<'py>> {
+    fn delay_damping<'py>(&self, py: Python<'py>, delay_s: f64) -> PyResult<Bound<'py, PyDict>> {
         let found = self.plan.delay_damping(delay_s).map_err(|e| to_py(py, &e))?;
-        Ok((
-            found.frequency_hz.into_pyarray(py),
-            found.damping_ratio.into_pyarray(py),
-            found.damping_ratio_without.into_pyarray(py),
-            found.first_order_change.into_pyarray(py),
-        ))
+        named!(py, found; frequency_hz, damping_ratio, damping_ratio_without, first_order_change)
     }
 
     /// None where target to measured is no one linear filter.

@@ -2,7 +2,7 @@
 
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::PyType;
+use pyo3::types::{PyTuple, PyType};
 use rthstrack::Error;
 
 static SIGNAL_ERROR: PyOnceLock<Py<PyType>> = PyOnceLock::new();
@@ -36,7 +36,15 @@ fn with_message(py: Python<'_>, error: &Error, message: String) -> PyErr {
         | Error::TooShortForChebyshev { .. } => SIGNAL_ERROR.import(py, "rthstrack.errors", "SignalError"),
         _ => setting_class(py),
     };
-    class.map_or_else(|e| e, |class| PyErr::from_type(class.clone(), message))
+    class.and_then(|class| told(class, &message, error)).unwrap_or_else(|e| e)
+}
+
+/// The exception, with its code and values.
+fn told(class: &Bound<'_, PyType>, message: &str, error: &Error) -> PyResult<PyErr> {
+    let exception = class.call1((message,))?;
+    exception.setattr("code", error.code())?;
+    exception.setattr("values", PyTuple::new(class.py(), error.values())?)?;
+    Ok(PyErr::from_value(exception))
 }
 
 /// A `SettingError` for a name that is not one of the choices.

@@ -1,33 +1,25 @@
 //! `choose_factors`, `prior_bounds`.
 
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use rthstrack::{DelayMeasure, FactorChange, FactorsConfig, Pair};
 
 use crate::error::to_py;
-use crate::tracking::{Evaluator, Numbers, numbers};
+use crate::named::{self, named};
+use crate::tracking::Evaluator;
 
-/// data_decimation, frequency_decimation, n_bins, amplitude, delay: an entry a pair of factors
-type Table<'py> = (
-    Bound<'py, PyArray1<usize>>,
-    Bound<'py, PyArray1<usize>>,
-    Bound<'py, PyArray1<usize>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-);
-/// P, Q, bounds of amplitude and delay, whether the delay is near zero, the evaluation compared with, all changes
-type Choice<'py> = (usize, usize, f64, f64, bool, Numbers, Table<'py>);
+/// An entry a pair of factors.
+fn table<'py>(py: Python<'py>, entries: &[FactorChange]) -> PyResult<Bound<'py, PyDict>> {
+    let whole = |of: fn(&FactorChange) -> usize| entries.iter().map(of).collect::<Vec<_>>();
+    let real = |of: fn(&FactorChange) -> f64| entries.iter().map(of).collect::<Vec<_>>();
+    named!(py, (); ; data_decimation: whole(|c| c.data_decimation),
+        frequency_decimation: whole(|c| c.frequency_decimation), n_bins: whole(|c| c.n_bins),
+        amplitude: real(|c| c.amplitude), delay: real(|c| c.delay))
+}
 
-fn table<'py>(py: Python<'py>, entries: &[FactorChange]) -> Table<'py> {
-    let whole = |f: fn(&FactorChange) -> usize| entries.iter().map(f).collect::<Vec<_>>().into_pyarray(py);
-    let real = |f: fn(&FactorChange) -> f64| entries.iter().map(f).collect::<Vec<_>>().into_pyarray(py);
-    (
-        whole(|c| c.data_decimation),
-        whole(|c| c.frequency_decimation),
-        whole(|c| c.n_bins),
-        real(|c| c.amplitude),
-        real(|c| c.delay),
-    )
+fn measure(measure: DelayMeasure) -> &'static str {
+    if measure == DelayMeasure::Phase { "phase" } else { "relative" }
 }
 
 #[pyfunction]
@@ -39,7 +31,7 @@ pub(crate) fn choose_factors<'py>(
     tolerance: f64,
     data_decimation: Option<usize>,
     frequency_decimation: Option<usize>,
-) -> PyResult<Choice<'py>> {
+) -> PyResult<Bound<'py, PyDict>> {
     let config = FactorsConfig { tolerance, data_decimation, frequency_decimation };
     let (target, measured) = (target.as_slice()?, measured.as_slice()?);
     let found = py
@@ -50,25 +42,19 @@ pub(crate) fn choose_factors<'py>(
             })
         })
         .map_err(|e| to_py(py, &e))?;
-    Ok((
-        found.data_decimation,
-        found.frequency_decimation,
-        found.amplitude_bound,
-        found.delay_bound,
-        found.measure == DelayMeasure::Phase,
-        numbers(&found.tracking),
-        table(py, &found.table),
-    ))
+    named!(py, found; data_decimation, frequency_decimation, amplitude_bound, delay_bound;
+        delay_measure: measure(found.measure), reference: named::tracking(py, &found.tracking)?,
+        changes: table(py, &found.table)?)
 }
 
-/// Bounds of P alone, of Q alone, and whether the delay is near zero.
+/// Bounds of P alone, of Q alone, and in which measure.
 #[pyfunction]
 pub(crate) fn prior_bounds<'py>(
     py: Python<'py>,
     evaluator: &Evaluator,
     target: PyReadonlyArray1<'py, f64>,
     measured: PyReadonlyArray1<'py, f64>,
-) -> PyResult<(Table<'py>, Table<'py>, bool)> {
+) -> PyResult<Bound<'py, PyDict>> {
     let (target, measured) = (target.as_slice()?, measured.as_slice()?);
     let found = py
         .detach(|| {
@@ -77,5 +63,6 @@ pub(crate) fn prior_bounds<'py>(
             })
         })
         .map_err(|e| to_py(py, &e))?;
-    Ok((table(py, &found.data), table(py, &found.frequency), found.measure == DelayMeasure::Phase))
+    named!(py, (); ; data: table(py, &found.data)?, frequency: table(py, &found.frequency)?,
+        measure: measure(found.measure))
 }

@@ -2,12 +2,13 @@
 
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use rthstrack::{KeyFrequenciesConfig, KeyFrequenciesState, Pair};
 
 use crate::error::to_py;
+use crate::named;
 use crate::pool::Pool;
 use crate::settings::Settings;
-use crate::tracking::{Numbers, numbers};
 
 /// The bins of one target, and the plan to evaluate pairs at them.
 #[pyclass(frozen, module = "rthstrack._core")]
@@ -52,17 +53,17 @@ impl KeyFrequencies {
         self.plan.delta_f_hz()
     }
 
-    fn evaluate(
+    fn evaluate<'py>(
         &self,
-        py: Python<'_>,
-        target: PyReadonlyArray1<'_, f64>,
-        measured: PyReadonlyArray1<'_, f64>,
-    ) -> PyResult<Numbers> {
+        py: Python<'py>,
+        target: PyReadonlyArray1<'py, f64>,
+        measured: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<Bound<'py, PyDict>> {
         let (target, measured) = (target.as_slice()?, measured.as_slice()?);
         let found = py.detach(|| {
             let pair = Pair::new(target, measured, self.plan.rate_hz())?;
             self.states.with(|| self.plan.state(), |state| self.plan.evaluate(state, &pair))
         });
-        found.map(|t| numbers(&t)).map_err(|e| to_py(py, &e))
+        named::tracking(py, &found.map_err(|e| to_py(py, &e))?)
     }
 }

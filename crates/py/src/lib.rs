@@ -1,6 +1,7 @@
 //! The binding: conversion only, one file per core module.
 
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
 mod dynamics;
 mod error;
@@ -10,6 +11,7 @@ mod key_frequencies;
 mod live;
 mod monitor;
 mod moving;
+mod named;
 mod pool;
 mod response;
 mod settings;
@@ -20,6 +22,7 @@ mod tracking;
 #[pymodule]
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    m.add("LIVE_NUMBERS", PyTuple::new(m.py(), named::live_numbers())?)?;
     m.add_function(wrap_pyfunction!(settings::settings_table, m)?)?;
     m.add_function(wrap_pyfunction!(settings::checked_settings, m)?)?;
     m.add_class::<tracking::Evaluator>()?;

@@ -13,8 +13,8 @@ use rthstrack_live::{LiveConfig, LiveError, LoggedReading};
 use serde_json::{Map, Number, Value};
 
 use crate::error::setting_error;
+use crate::named::{self, named};
 use crate::settings::read_all;
-use crate::tracking::words;
 
 /// A setting of plain Python types. Numbers that JSON does not know stay in words, so that their mistake can be told.
 fn value(object: &Bound<'_, PyAny>) -> PyResult<Value> {
@@ -144,52 +144,26 @@ impl Live {
         let columns = py.detach(|| self.run.take_samples());
         let shape = (columns.index.len(), self.run.n_actuators());
         let signal = |values| Array2::from_shape_vec(shape, values).expect("one sample a row").into_pyarray(py);
-        let dict = PyDict::new(py);
-        dict.set_item("index", columns.index.into_pyarray(py))?;
-        dict.set_item("time_s", columns.time_s.into_pyarray(py))?;
-        dict.set_item("counter", columns.counter.into_pyarray(py))?;
-        dict.set_item("filled", columns.filled.into_pyarray(py))?;
-        dict.set_item("target", signal(columns.target))?;
-        dict.set_item("measured", signal(columns.measured))?;
-        Ok(dict)
+        let (target, measured) = (signal(columns.target), signal(columns.measured));
+        named!(py, columns; index, time_s, counter, filled; target: target, measured: measured)
     }
 
     /// Drains the readings that wait for the log.
     fn take_readings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let logged = py.detach(|| self.run.take_readings());
-        let dict = PyDict::new(py);
-        let numbers = |name: &str, of: fn(&LoggedReading) -> f64| {
-            dict.set_item(name, logged.iter().map(of).collect::<Vec<f64>>().into_pyarray(py))
-        };
-        let whole = |name: &str, of: fn(&LoggedReading) -> u64| {
-            dict.set_item(name, logged.iter().map(|r| of(r) as i64).collect::<Vec<i64>>().into_pyarray(py))
-        };
-        let interval = |name: &str, of: fn(&LoggedReading) -> (f64, f64)| {
-            let ends = logged.iter().map(of).flat_map(|(low, high)| [low, high]).collect();
-            let rows = Array2::from_shape_vec((logged.len(), 2), ends).expect("low and high");
-            dict.set_item(name, rows.into_pyarray(py))
-        };
-        whole("index", |r| r.reading.index)?;
-        numbers("time_s", |r| r.reading.time_s)?;
-        numbers("centre_s", |r| r.reading.centre_s)?;
-        whole("actuator", |r| r.reading.actuator as u64)?;
-        numbers("amplitude", |r| r.reading.tracking.amplitude)?;
-        numbers("delay_s", |r| r.reading.tracking.delay_s)?;
-        numbers("phase_rad", |r| r.reading.tracking.phase_rad)?;
-        numbers("equivalent_frequency_hz", |r| r.reading.tracking.equivalent_frequency_hz)?;
-        interval("amplitude_interval", |r| r.reading.tracking.amplitude_interval)?;
-        interval("delay_interval_s", |r| r.reading.tracking.delay_interval_s)?;
-        let valid: Vec<bool> = logged.iter().map(|r| r.reading.is_valid()).collect();
-        dict.set_item("valid", valid.into_pyarray(py))?;
-        let reasons: Vec<Option<String>> =
-            logged.iter().map(|r| r.reading.tracking.reason.as_ref().map(|reason| words(Some(reason)))).collect();
-        dict.set_item("reason", reasons)?;
-        whole("received", |r| r.totals.tally.received)?;
-        whole("lost", |r| r.totals.tally.lost)?;
-        whole("repeated", |r| r.totals.tally.repeated)?;
-        whole("reordered", |r| r.totals.tally.reordered)?;
-        whole("malformed", |r| r.totals.malformed)?;
-        dict.set_item("alarms", logged.into_iter().map(|r| r.alarms).collect::<Vec<String>>())?;
+        let each = logged.iter().map(|r| &r.reading.tracking);
+        let numbers = |of: fn(&LoggedReading) -> f64| logged.iter().map(of).collect::<Vec<f64>>();
+        let whole = |of: fn(&LoggedReading) -> u64| logged.iter().map(|r| of(r) as i64).collect::<Vec<i64>>();
+        let [reason, reason_code, reason_values] = named::reasons(py, each.clone())?;
+        let dict = named!(py, (); ;
+            index: whole(|r| r.reading.index), time_s: numbers(|r| r.reading.time_s),
+            centre_s: numbers(|r| r.reading.centre_s), actuator: whole(|r| r.reading.actuator as u64),
+            valid: logged.iter().map(|r| r.reading.is_valid()).collect::<Vec<_>>(),
+            reason: reason, reason_code: reason_code, reason_values: reason_values,
+            received: whole(|r| r.totals.tally.received), lost: whole(|r| r.totals.tally.lost),
+            repeated: whole(|r| r.totals.tally.repeated), reordered: whole(|r| r.totals.tally.reordered),
+            malformed: whole(|r| r.totals.malformed), alarms: logged.iter().map(|r| r.alarms.clone()).collect::<Vec<_>>())?;
+        dict.update(named::columns(py, each, true)?.as_mapping())?;
         Ok(dict)
     }
 

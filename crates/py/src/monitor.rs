@@ -1,24 +1,13 @@
 //! `Monitor`: one stream, for one thread.
 
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use rthstrack::{CausalDecimator, MonitorConfig, MonitorState, Reading, Tracking};
+use pyo3::types::PyDict;
+use rthstrack::{CausalDecimator, MonitorConfig, MonitorState, Reading};
 
 use crate::error::to_py;
+use crate::named::{self, named};
 use crate::settings::Given;
-use crate::tracking::words;
-
-type Numbers<'py> = Bound<'py, PyArray1<f64>>;
-/// (n_readings, 2)
-type Pairs<'py> = Bound<'py, PyArray2<f64>>;
-
-/// index, actuator, valid; time_s, centre_s, amplitude, delay_s, phase_rad, equivalent_frequency_hz; amplitude_interval,
-/// delay_interval_s, reason
-type Arrays<'py> = (
-    (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<bool>>),
-    (Numbers<'py>, Numbers<'py>, Numbers<'py>, Numbers<'py>, Numbers<'py>, Numbers<'py>),
-    (Pairs<'py>, Pairs<'py>, Vec<String>),
-);
 
 /// The plan and the state of one stream.
 #[pyclass(module = "rthstrack._core")]
@@ -61,13 +50,18 @@ impl Monitor {
         self.plan.samples_until_reading(&self.state)
     }
 
-    /// Arrays of shape (n_samples, n_actuators).
+    #[getter]
+    fn no_readings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        arrays(py, &[])
+    }
+
+    /// Takes arrays of shape (n_samples, n_actuators); None where they bring no reading.
     fn process<'py>(
         &mut self,
         py: Python<'py>,
         target: PyReadonlyArray2<'py, f64>,
         measured: PyReadonlyArray2<'py, f64>,
-    ) -> PyResult<Arrays<'py>> {
+    ) -> PyResult<Option<Bound<'py, PyDict>>> {
         let n_samples = target.shape()[0];
         let (target, measured) = (target.as_slice()?, measured.as_slice()?);
         let Self { plan, state } = self;
@@ -76,7 +70,7 @@ impl Monitor {
             plan.process(state, target, measured, &mut readings);
             readings
         });
-        Ok(arrays(py, &readings))
+        if readings.is_empty() { Ok(None) } else { arrays(py, &readings).map(Some) }
     }
 
     fn restart(&mut self, index: u64) {
@@ -90,37 +84,21 @@ pub(crate) fn causal_decimate<'py>(
     py: Python<'py>,
     samples: PyReadonlyArray1<'py, f64>,
     data_decimation: usize,
-) -> PyResult<(Numbers<'py>, usize)> {
+) -> PyResult<(Bound<'py, PyArray1<f64>>, usize)> {
     let plan = CausalDecimator::new(data_decimation).map_err(|e| to_py(py, &e))?;
     let samples = samples.as_slice()?;
     Ok((py.detach(|| plan.process(samples)).into_pyarray(py), plan.delay()))
 }
 
 /// Readings as columns.
-fn arrays<'py>(py: Python<'py>, readings: &[Reading]) -> Arrays<'py> {
-    let numbers = |of: fn(&Reading) -> f64| readings.iter().map(of).collect::<Vec<_>>().into_pyarray(py);
-    let pairs = |of: fn(&Tracking) -> (f64, f64)| {
-        let rows: Vec<[f64; 2]> = readings.iter().map(|r| of(&r.tracking)).map(|(low, high)| [low, high]).collect();
-        numpy::ndarray::Array2::from(rows).into_pyarray(py)
-    };
-    (
-        (
-            readings.iter().map(|r| r.index as i64).collect::<Vec<_>>().into_pyarray(py),
-            readings.iter().map(|r| r.actuator as i64).collect::<Vec<_>>().into_pyarray(py),
-            readings.iter().map(Reading::is_valid).collect::<Vec<_>>().into_pyarray(py),
-        ),
-        (
-            numbers(|r| r.time_s),
-            numbers(|r| r.centre_s),
-            numbers(|r| r.tracking.amplitude),
-            numbers(|r| r.tracking.delay_s),
-            numbers(|r| r.tracking.phase_rad),
-            numbers(|r| r.tracking.equivalent_frequency_hz),
-        ),
-        (
-            pairs(|t| t.amplitude_interval),
-            pairs(|t| t.delay_interval_s),
-            readings.iter().map(|r| words(r.tracking.reason.as_ref())).collect(),
-        ),
-    )
+fn arrays<'py>(py: Python<'py>, readings: &[Reading]) -> PyResult<Bound<'py, PyDict>> {
+    let each = readings.iter().map(|r| &r.tracking);
+    let whole = |of: fn(&Reading) -> u64| readings.iter().map(|r| of(r) as i64).collect::<Vec<_>>();
+    let numbers = |of: fn(&Reading) -> f64| readings.iter().map(of).collect::<Vec<_>>();
+    let [reason, reason_code, reason_values] = named::reasons(py, each.clone())?;
+    named!(py, (); ;
+        index: whole(|r| r.index), time_s: numbers(|r| r.time_s), centre_s: numbers(|r| r.centre_s),
+        actuator: whole(|r| r.actuator as u64), numbers: named::columns(py, each, false)?,
+        valid: readings.iter().map(Reading::is_valid).collect::<Vec<_>>(),
+        reason: reason, reason_code: reason_code, reason_values: reason_values)
 }

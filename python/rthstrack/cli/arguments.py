@@ -63,9 +63,9 @@ OPTIONS = {
 }
 
 
-def told(error: RthstrackError) -> str:
+def told(error: RthstrackError, *, with_file: bool = True) -> str:
     """An error's message, its advice and the settings it speaks of in the command's words."""
-    message = error.told(OPTIONS)
+    message = error.told(OPTIONS, with_file=with_file)
     return spoken(message) if isinstance(error, SettingError) else message
 
 

@@ -62,13 +62,13 @@ def _listing(file: str) -> dict[str, Any]:
     try:
         recording = recording_from(contents, file)
     except RecordingError as error:
-        problem = told(error).removeprefix(f"{file}: ")
+        problem = told(error, with_file=False)
         recording = recording_from(contents, file, rate_hz=1.0)
         recording = Recording(file, recording.format, recording.channels, None, problem, 0.0, contents.notes)
     try:
         pairs, why = propose_pair(recording)
     except ChannelError as error:
-        pairs, why = [], told(error).removeprefix(f"{file}: ")
+        pairs, why = [], told(error, with_file=False)
     return {
         "file": file,
         "format": recording.format,

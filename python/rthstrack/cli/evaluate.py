@@ -18,15 +18,16 @@ from rthstrack.cli.progress import counted
 from rthstrack.cli.setting_options import FACTORS, setting_options, settle, with_auto
 from rthstrack.errors import RecordingError, RthstrackError, SettingError, SignalError
 from rthstrack.evaluation.factors import TOLERANCE
-from rthstrack.evaluation.results import json_ready
+from rthstrack.evaluation.results import NUMBERS, end_names, is_interval, json_ready
 from rthstrack.evaluation.tracking import Evaluator
 from rthstrack.recording.chosen import read_chosen
 from rthstrack.recording.readers import FORMAT_NAMES
 from rthstrack.recording.recording import Recording
+from rthstrack.said import Said, coded
 from rthstrack.verdict import display
 from rthstrack.verdict.assessment import Assessment, assess, trusted_settings, without_trusted
 from rthstrack.verdict.display import with_interval
-from rthstrack.verdict.entry import result_entry
+from rthstrack.verdict.entry import OF_TRUSTED, result_entry
 from rthstrack.verdict.limits import Limits
 from rthstrack.verdict.sentence import reason
 
@@ -90,7 +91,10 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
     if args.json:
         document = {
             "results": [result_entry(a) for a in assessments],
-            "failures": [{"file": file, "error": error} for file, error in failures],
+            "failures": [
+                {"file": file, "error": str(error), "code": error.code, "values": json_ready(error.values)}
+                for file, error in failures
+            ],
         }
         print(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False))
     else:
@@ -113,7 +117,7 @@ def assess_file(file: str, args: argparse.Namespace) -> list[Assessment]:
     commands: Sequence[str | None] = args.command or [None] * len(pairs)
     if len(commands) != len(pairs):
         raise RecordingError(
-            f"{file}: {len(commands)} --command for {len(pairs)} proposed pairs: name each --target and --measured"
+            f"{len(commands)} --command for {len(pairs)} proposed pairs: name each --target and --measured", file=file
         )
     found = []
     for actuator, ((target, measured), command) in enumerate(zip(pairs, commands, strict=True)):
@@ -169,15 +173,16 @@ def _assess(
             origin=origin,
         )
     except SignalError as error:
-        hint = " (--fill SAMPLES interpolates short gaps)" if "NaN" in str(error) and not args.fill else ""
+        hint = " (--fill SAMPLES interpolates short gaps)" if error.code == "not_finite" and not args.fill else ""
         channels = f"target '{asked.name}', measured '{answered.name}'"
-        raise SignalError(f"{recording.file}: {channels}: {error}{hint}") from None
+        raise error.reworded(f"{channels}: {error}{hint}").about(recording.file) from None
     except SettingError as error:
-        raise SettingError(f"{recording.file}: {error}") from None
+        raise error.about(recording.file) from None
     said = list(assessment.warnings)
     if proposal is not None and part == "whole":
-        said.insert(0, f"no channels were named: judged target '{asked.name}', measured '{answered.name}' ({proposal})")
-    said += recording.notes if part == "whole" else ()
+        words = f"no channels were named: judged target '{asked.name}', measured '{answered.name}' ({proposal})"
+        said.insert(0, Said(words, "channels_proposed"))
+    said += [coded(note, "note") for note in recording.notes] if part == "whole" else []
     return dataclasses.replace(assessment, warnings=tuple(said))
 
 
@@ -212,21 +217,20 @@ def _check(args: argparse.Namespace, misuse: Callable[[str], Any]) -> None:
             misuse(f"--{option}: there is no directory {path.parent}")
 
 
-def _evaluate_all(args: argparse.Namespace) -> tuple[list[list[Assessment]], list[tuple[str, str]]]:
+def _evaluate_all(args: argparse.Namespace) -> tuple[list[list[Assessment]], list[tuple[str, RthstrackError]]]:
     """All files, on all cores; one that fails does not stop the rest."""
 
-    def one(file: str) -> list[Assessment] | str:
+    def one(file: str) -> list[Assessment] | RthstrackError:
         try:
             return assess_file(file, args)
         except RthstrackError as error:
-            message = told(error)
-            return message if message.startswith(file) else f"{file}: {message}"
+            return error.about(file)
         except MemoryError:
-            return f"{file}: does not fit into memory"
+            return RecordingError("does not fit into memory", file=file, code="memory")
 
     files = args.files
     if len(files) == 1:
-        found: Iterable[list[Assessment] | str] = [one(files[0])]
+        found: Iterable[list[Assessment] | RthstrackError] = [one(files[0])]
     else:
         from concurrent.futures import ThreadPoolExecutor
 
@@ -234,7 +238,7 @@ def _evaluate_all(args: argparse.Namespace) -> tuple[list[list[Assessment]], lis
             found = list(counted("evaluating", pool.map(one, files), len(files)))
     results, failures = [], []
     for file, outcome in zip(files, found, strict=True):
-        if isinstance(outcome, str):
+        if isinstance(outcome, RthstrackError):
             failures.append((file, outcome))
         else:
             results.append(outcome)
@@ -282,21 +286,18 @@ def _flat(entry: dict[str, Any], before: str = "") -> dict[str, Any]:
     for key, value in entry.items():
         if isinstance(value, dict):
             row |= _flat(value, f"{before}{key}.")
-        elif "interval" in key:
-            stem, unit = (key[:-2], "_s") if key.endswith("_s") else (key, "")
-            row |= dict(
-                zip((f"{before}{stem}_low{unit}", f"{before}{stem}_high{unit}"), value or ("", ""), strict=True)
-            )
+        elif is_interval(key):
+            row |= {before + end: one for end, one in zip(end_names(key), value or ("", ""), strict=True)}
+        elif key == "warning_codes":
+            row[before + key] = "; ".join(warning["code"] for warning in value)
         else:
             row[before + key] = "; ".join(map(str, value)) if isinstance(value, list | tuple) else value
     return row
 
 
-_READING = (
-    "amplitude", "delay_s", "phase_rad", "equivalent_frequency_hz", "valid", "amplitude_std", "amplitude_interval",
-    "delay_std_s", "delay_interval_s", "residual_coherence", "goodness", "reason",
-)  # fmt: skip
-_TRUSTED_READING = ("amplitude", "delay_s", "valid", "amplitude_interval", "delay_interval_s", "reason")
+_REASON = ("reason", "reason_code", "reason_values")
+_READING = (*NUMBERS[:4], "valid", *(name for name in NUMBERS[4:] if name not in OF_TRUSTED), *_REASON)
+_TRUSTED_READING = ("amplitude", "delay_s", "valid", "amplitude_interval", "delay_interval_s", *_REASON)
 
 
 def _readings(a: Assessment) -> Iterable[dict[str, Any]]:
@@ -308,7 +309,7 @@ def _readings(a: Assessment) -> Iterable[dict[str, Any]]:
         trusted = {f"trusted_{name}": json_ready(getattr(a.trusted_moving, name)[i]) for name in _TRUSTED_READING}
         for name, value in (row | trusted).items():
             # No interval is no pair of missing ends.
-            if "interval" in name and None in value:
+            if is_interval(name.removeprefix("trusted_")) and None in value:
                 (row if name in row else trusted)[name] = None
         yield _flat(about | {"time_s": a.start_s + float(time_s)} | row | trusted)
 
@@ -340,14 +341,13 @@ def _print_one(console: Console, a: Assessment) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    t, i = a.tracking, a.indices
+    t = a.tracking
     which = f"actuator {a.actuator}: " if a.actuator else ""
     console.print(Text(f"{which}{_PARTS[a.part]}{a.verdict}", style="bold"))
     console.print(Text(a.argument))
     for text in a.exceeded:
         console.print(Text(f"limit exceeded: {text}", style="bold red"))
     console.print(_side_by_side(a))
-    unit = f" {a.unit}" if a.unit else ""
     table = Table(box=None, show_header=False, pad_edge=False)
     table.add_column(style="dim", no_wrap=True)
     table.add_column(overflow="fold")
@@ -361,10 +361,7 @@ def _print_one(console: Console, a: Assessment) -> None:
         *([("P and Q chosen", a.factors.sentence)] if a.factors else []),
         *([("a larger Q", a.factors.windowed.sentence)] if a.factors and a.factors.windowed else []),
         *_moving_rows(a),
-        ("max tracking error", f"{i.max_tracking_error:.4g}{unit} ({i.max_tracking_error_percent:.3g} %)"),
-        ("rms error", f"{i.rms_error:.4g}{unit} ({i.rms_error_percent:.3g} %)"),
-        ("tracking indicator", f"{i.tracking_indicator:.4g}" + (f"{unit}^2" if unit else "")),
-        ("J1, J2, J3", f"{1e3 * i.j1_s:.4g} ms, {i.j2_percent:.3g} %, {i.j3_percent:.3g} %"),
+        *_index_rows(a),
     ):
         table.add_row(label, Text(value))
     console.print(table)
@@ -429,8 +426,25 @@ def _most_frequent(moving: MovingTracking) -> str:
 
 def _reason_rows(a: Assessment) -> list[tuple[str, str]]:
     """Why a number or an interval is missing, each reason once."""
-    reasons = dict.fromkeys(filter(None, (reason(a.tracking), reason(a.trusted))))
-    return [(what, why) for what, _, why in (text.partition(": ") for text in reasons)]
+    rows = {}
+    for t in (a.tracking, a.trusted):
+        if why := reason(t):
+            rows[why] = ("not determined" if math.isnan(float(t.delay_s)) else "no interval", why.cause)
+    return list(rows.values())
+
+
+def _index_rows(a: Assessment) -> list[tuple[str, str]]:
+    """The indices that there are, those of one name in one row."""
+    own = {"unit": a.unit, "unit2": f"{a.unit}^2" if a.unit else None}
+    rows: dict[str, list[str]] = {}
+    for _, field, unit, scale, percent, _, name in display.INDICES:
+        value = getattr(a.indices, field)
+        if value is None:
+            continue
+        text = f"{scale * value:{'.3g' if unit == '%' else '.4g'}} {own.get(unit, unit) or ''}".rstrip()
+        beside = "" if percent is None else f" ({getattr(a.indices, percent):.3g} %)"
+        rows.setdefault(name, []).append(text + beside)
+    return [(name, ", ".join(texts)) for name, texts in rows.items()]
 
 
 def _moving_rows(a: Assessment) -> list[tuple[str, str]]:

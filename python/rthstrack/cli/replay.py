@@ -103,10 +103,10 @@ def _read(args: argparse.Namespace) -> tuple[str, _Signals]:
     lengths = {one.name: len(one.values) for pair in channels for one in pair}
     if len(set(lengths.values())) > 1:
         listed = ", ".join(f"'{name}' {length}" for name, length in lengths.items())
-        raise RecordingError(f"{args.file}: expected channels of one length, found {listed}; name them with --target "
-                             "and --measured")  # fmt: skip
+        raise RecordingError(f"expected channels of one length, found {listed}; name them with --target "
+                             "and --measured", file=args.file)  # fmt: skip
     if not all(lengths.values()):
-        raise RecordingError(f"{args.file}: there are no samples to send")
+        raise RecordingError("there are no samples to send", file=args.file)
     names = ", ".join(f"target '{target.name}', measured '{measured.name}'" for target, measured in channels[:3])
     names += f" and {len(channels) - 3} more pairs" if len(channels) > 3 else ""
     target, measured = (np.column_stack([pair[i].values for pair in channels]) for i in (0, 1))

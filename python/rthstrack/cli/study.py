@@ -235,8 +235,7 @@ def _read_all(args: argparse.Namespace) -> tuple[list[Pair], list[tuple[str, str
         try:
             return read_pairs(file, **chosen(args))
         except RthstrackError as error:
-            message = told(error)
-            return message if message.startswith(file) else f"{file}: {message}"
+            return told(error.about(file))
         except MemoryError:
             return f"{file}: does not fit into memory"
 

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rthstrack._core import _BadEntry as BadEntry
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,11 +27,8 @@ class BadSamples:
     every: int = 0
 
 
-def _bad_samples(entries: list[tuple[str, str, int, int, int]], rate_hz: float) -> tuple[BadSamples, ...]:
-    return tuple(
-        BadSamples(channel, kind, count, first, first / rate_hz, every)
-        for channel, kind, count, first, every in entries
-    )
+def _bad_samples(entries: list[BadEntry], rate_hz: float) -> tuple[BadSamples, ...]:
+    return tuple([BadSamples(**entry, first_s=entry["first"] / rate_hz) for entry in entries]) if entries else ()
 
 
 def bad_words(found: tuple[BadSamples, ...]) -> str:

@@ -18,7 +18,7 @@ from rthstrack.errors import SignalError
 from rthstrack.evaluation.inputs import _count, _number, _samples, _single, merged
 from rthstrack.evaluation.results import _Result
 from rthstrack.evaluation.settings import Settings
-from rthstrack.evaluation.tracking import Tracking, _plan
+from rthstrack.evaluation.tracking import _SPECTRA, Tracking, _plan, _tracked
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -166,37 +166,28 @@ def choose_factors(
     plan = _plan(len(t), rate := _number("rate_hz", rate_hz), base)
     allowed = _number("tolerance", tolerance)
     reference = dataclasses.replace(base, data_decimation=p or 1, frequency_decimation=q or 1)
-    chosen_p, chosen_q, amplitude_bound, delay_bound, measure, numbers, changed = _choice(
-        core_choose_factors(plan, t, m, allowed, p, q)
+    choice: Any = core_choose_factors(plan, t, m, allowed, p, q)
+    changed = FactorChanges(**choice.pop("changes"), measure=choice["delay_measure"])
+    chosen = {name: choice[name] for name in ("data_decimation", "frequency_decimation")}
+    choice["reference"] = _tracked(
+        [choice["reference"]],
+        1,
+        n_bins=int(changed.n_bins[0]),
+        delta_f_hz=plan.delta_f_hz * reference.frequency_decimation,
+        rate_hz=rate,
+        n_samples=len(t),
+        settings=reference,
+        **dict.fromkeys(_SPECTRA),
     )
     found = Factors(
-        chosen_p,
-        chosen_q,
-        amplitude_bound,
-        delay_bound,
-        measure,
-        allowed,
-        dataclasses.replace(base, data_decimation=chosen_p, frequency_decimation=chosen_q),
-        _tracking(
-            numbers,
-            int(changed.n_bins[0]),
-            plan.delta_f_hz * reference.frequency_decimation,
-            rate,
-            len(t),
-            reference,
-        ),
-        changed,
+        **choice,
+        tolerance=allowed,
+        settings=dataclasses.replace(base, **chosen),
+        changes=changed,
     )
     if q is None and _may_grow(found):
         return dataclasses.replace(found, windowed=_windowed(t, m, rate, found, base, p))
     return found
-
-
-def _choice(found: Any) -> tuple[int, int, float, float, Literal["relative", "phase"], Any, FactorChanges]:
-    p, q, amplitude_bound, delay_bound, near_zero, numbers, table = found
-    measure: Literal["relative", "phase"] = "phase" if near_zero else "relative"
-    columns: Any = (*table, measure)
-    return p, q, amplitude_bound, delay_bound, measure, numbers, FactorChanges(*columns)
 
 
 def _may_grow(found: Factors) -> bool:
@@ -226,20 +217,14 @@ def _windowed(
             continue
         plan = _plan(len(target), rate_hz, settings)
         try:
-            choice = core_choose_factors(plan, target, measured, found.tolerance, data_decimation, None)
+            choice: Any = core_choose_factors(plan, target, measured, found.tolerance, data_decimation, None)
         except SignalError:
             continue  # nothing is left to judge by
-        p, q, amplitude_bound, delay_bound, measure, _, _ = _choice(choice)
+        allowed: Any = {f.name: choice[f.name] for f in dataclasses.fields(WindowedFactors) if f.name in choice}
+        p, q = choice["data_decimation"], choice["frequency_decimation"]
         if q > found.frequency_decimation and p * q >= found.data_decimation * found.frequency_decimation:
-            return WindowedFactors(settings.window, detrend, p, q, amplitude_bound, delay_bound, measure)
+            return WindowedFactors(window=settings.window, detrend=detrend, **allowed)
     return None
-
-
-def _tracking(numbers: Any, *about: Any) -> Tracking:
-    """What the core found, averages and precision, around what it was found of."""
-    averaged, precision = numbers
-    fields = (*averaged, *about, *precision)
-    return Tracking(*fields)
 
 
 def prior_bounds(
@@ -260,9 +245,12 @@ def prior_bounds(
     """
     t, m = _single(target, measured)
     plan = _plan(len(t), _number("rate_hz", rate_hz), _without_factors(settings, changes))
-    over_p, over_q, near_zero = core_prior_bounds(plan, t, m)
-    measure: Literal["relative", "phase"] = "phase" if near_zero else "relative"
-    return FactorChanges(*over_p, measure), FactorChanges(*over_q, measure)
+    found = core_prior_bounds(plan, t, m)
+    data, frequency = (FactorChanges(**found[over], measure=found["measure"]) for over in _OVER)
+    return data, frequency
+
+
+_OVER: tuple[Literal["data", "frequency"], ...] = ("data", "frequency")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -293,9 +281,9 @@ class KeyFrequencies(_Result):
         t, m = _single(target, measured)
         if len(t) != self.n_samples:
             raise SignalError(f"these key frequencies are planned for {self.n_samples} samples, not for {len(t)}")
-        numbers = self._plan.evaluate(t, m)
-        bins = (self.frequency_hz.size, self.delta_f_hz)
-        return _tracking(numbers, *bins, self.rate_hz, self.n_samples, self.settings)
+        about = {name: getattr(self, name) for name in ("delta_f_hz", "rate_hz", "n_samples", "settings")}
+        found = [self._plan.evaluate(t, m)]
+        return _tracked(found, 1, n_bins=self.frequency_hz.size, **about, **dict.fromkeys(_SPECTRA))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain Python values: numbers, strings, lists, dicts."""

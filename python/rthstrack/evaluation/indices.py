@@ -77,7 +77,8 @@ def indices(
     """
     t, m = _single(target, measured)
     f = None if force is None else _samples("force", force)
-    return Indices(*core_indices(t, m, _number("rate_hz", rate_hz), f, _number("max_lag_s", max_lag_s)))
+    found: Any = core_indices(t, m, _number("rate_hz", rate_hz), f, _number("max_lag_s", max_lag_s))
+    return Indices(**found)
 
 
 def index_histories(
@@ -93,4 +94,4 @@ def index_histories(
     t, m = _single(target, measured)
     rate_hz = _number("rate_hz", rate_hz)
     f = None if force is None else _samples("force", force)
-    return IndexHistories(*core_index_histories(t, m, rate_hz, f), rate_hz)
+    return IndexHistories(**core_index_histories(t, m, rate_hz, f), rate_hz=rate_hz)

@@ -12,7 +12,7 @@ from rthstrack._core import Monitor as CoreMonitor
 from rthstrack._core import causal_decimate as core_causal_decimate
 from rthstrack.errors import SettingError, SignalError
 from rthstrack.evaluation.inputs import _count, _samples, merged
-from rthstrack.evaluation.results import _ends, _Result
+from rthstrack.evaluation.results import _made, _Numbers
 from rthstrack.evaluation.settings import MonitorSettings
 
 if TYPE_CHECKING:
@@ -21,39 +21,33 @@ if TYPE_CHECKING:
     from rthstrack.evaluation.settings import MonitorKeywords
 
 
-@dataclass(frozen=True, slots=True)
-class Readings(_Result):
+@dataclass(frozen=True, kw_only=True)
+class Readings(_Numbers["NDArray[np.float64]", "NDArray[np.float64]"]):
     """Readings of one call, a row an actuator and window; intervals with (low, high) last.
 
     `index` is that of the sample that completed the window, `time_s` its time from sample 0, `centre_s` the window's
-    centre in the same time, the decimator's delay taken out. Where `valid` is False the numbers are NaN and `reason`
-    says why; where it is True it says why there is no interval, or is empty.
+    centre in the same time, the decimator's delay taken out. The numbers are those of `Tracking`. Where `valid` is
+    False they are NaN and `reason` says why; where it is True it says why there is no interval, or is empty.
+    `reason_code` is its name, which never changes, `reason_values` what it says in numbers, in SI units.
     """
 
     index: NDArray[np.int64]
     time_s: NDArray[np.float64]
     centre_s: NDArray[np.float64]
     actuator: NDArray[np.int64]
-    amplitude: NDArray[np.float64]
-    delay_s: NDArray[np.float64]
-    phase_rad: NDArray[np.float64]
-    equivalent_frequency_hz: NDArray[np.float64]
-    amplitude_interval: NDArray[np.float64]
-    delay_interval_s: NDArray[np.float64]
     valid: NDArray[np.bool_]
     reason: tuple[str, ...]
+    reason_code: tuple[str, ...]
+    reason_values: tuple[tuple[float, ...], ...]
     settings: MonitorSettings
 
     def __len__(self) -> int:
         return len(self.index)
 
     def _columns(self) -> dict[str, Any]:
-        plain = ("index", "time_s", "centre_s", "actuator", "amplitude", "delay_s", "phase_rad",
-                 "equivalent_frequency_hz")  # fmt: skip
-        columns: dict[str, Any] = {name: getattr(self, name) for name in plain}
-        for name in ("amplitude_interval", "delay_interval_s"):
-            columns |= _ends(name, getattr(self, name))
-        return columns | {"valid": self.valid, "reason": list(self.reason)}
+        columns: dict[str, Any] = {name: getattr(self, name) for name in ("index", "time_s", "centre_s", "actuator")}
+        columns |= self._number_columns() | {"valid": self.valid}
+        return columns | {name: list(getattr(self, name)) for name in ("reason", "reason_code", "reason_values")}
 
 
 def largest_decimation(rate_hz: float, high_hz: float, update_hz: float = 0.0) -> int:
@@ -96,7 +90,7 @@ class Monitor:
     7.992 s: 0.950, 20.00 ms
     """
 
-    __slots__ = ("_stream", "settings")
+    __slots__ = ("_nothing", "_stream", "settings")
 
     def __init__(
         self,
@@ -118,6 +112,7 @@ class Monitor:
             factor = largest_decimation(self.settings.rate_hz, band_hz[1], self.settings.update_hz)
             self.settings = dataclasses.replace(self.settings, data_decimation=factor)
         self._stream = CoreMonitor(self.settings)
+        self._nothing = self._readings(self._stream.no_readings)
 
     @property
     def update_hz(self) -> float:
@@ -158,10 +153,14 @@ class Monitor:
         if t.shape != m.shape or t.ndim != 2 or t.shape[1] != n:
             expected = "(n_samples,)" if n == 1 else f"(n_samples, {n})"
             raise SignalError(f"target and measured must both have the shape {expected}, not {t.shape} and {m.shape}")
-        (index, actuator, valid), numbers, (amplitude_interval, delay_interval_s, reason) = self._stream.process(t, m)
-        time_s, centre_s, amplitude, delay_s, phase_rad, frequency_hz = numbers
-        return Readings(index, time_s, centre_s, actuator, amplitude, delay_s, phase_rad, frequency_hz,
-                        amplitude_interval, delay_interval_s, valid, tuple(reason), self.settings)  # fmt: skip
+        found = self._stream.process(t, m)
+        return self._nothing if found is None else self._readings(found)
+
+    def _readings(self, found: Any) -> Readings:
+        numbers = found.pop("numbers")
+        for name in ("reason", "reason_code", "reason_values"):
+            found[name] = tuple(found[name])
+        return _made(Readings, numbers, found, {"settings": self.settings})
 
     def restart(self, index: int = 0) -> None:
         """Forgets all samples; the next one has this index, from 0 on. Raises SettingError."""

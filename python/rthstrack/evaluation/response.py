@@ -154,10 +154,10 @@ def frequency_response(
     rate_hz = _number("rate_hz", rate_hz)
     segment = None if segment_s is None else _number("segment_s", segment_s)
     share, given_s = _number("overlap", overlap), None if align_s is None else _number("align_s", align_s)
-    settings = (segment, share, window, detrend, given_s, bool(dispersion))
-    curves, uncertainty, n_segments, length_s, used_s, why = core_frequency_response(t, m, rate_hz, settings)
-    about: Any = (length_s, share, n_segments, window, detrend, used_s, bool(dispersion), rate_hz, why)
-    return FrequencyResponse(*curves, *uncertainty, *about)
+    how: dict[str, Any] = {"overlap": share, "window": window, "detrend": detrend}
+    settings: Any = {"segment_s": segment, "align_s": given_s, "dispersion": bool(dispersion)} | how
+    found: Any = core_frequency_response(t, m, rate_hz, settings)
+    return FrequencyResponse(**found, **how, dispersion=bool(dispersion), rate_hz=rate_hz)
 
 
 def frequency_slopes(
@@ -197,10 +197,7 @@ def frequency_slopes(
     segment = None if segment_s is None else _number("segment_s", segment_s)
     share = _number("overlap", overlap)
     start_s = 0.0 if align_s is None else _number("align_s", align_s)
-    settings = (segment, share, window, detrend, start_s, False)
-    f_eq, gain, delay, band, n_bins, found_s, dispersion, n_segments, length_s = core_frequency_slopes(
-        t, m, rate_hz, _band(band_hz), align_s is not None, settings
-    )
-    return FrequencySlopes(
-        f_eq, *gain, *delay, band, n_bins, found_s, dispersion, length_s, share, n_segments, window, detrend, rate_hz
-    )
+    how: dict[str, Any] = {"overlap": share, "window": window, "detrend": detrend}
+    settings: Any = {"segment_s": segment, "align_s": start_s, "dispersion": False} | how
+    found: Any = core_frequency_slopes(t, m, rate_hz, _band(band_hz), align_s is not None, settings)
+    return FrequencySlopes(**found, **how, rate_hz=rate_hz)

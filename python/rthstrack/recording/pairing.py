@@ -114,15 +114,17 @@ def propose_pair(recording: Recording) -> tuple[list[tuple[str, str]], str]:
     elif any(one.role for one in named):
         roles = ", ".join(f"'{channels[one.index].name}' ({one.role})" for one in named if one.role)
         raise ChannelError(
-            f"{recording.file}: no likely target/measured pair: found only {roles}",
+            f"no likely target/measured pair: found only {roles}",
+            file=recording.file,
             advice="name them: {target}, {measured}",
         )
     else:
         guess = _by_likeness(recording, named)
         if guess is None:
             raise ChannelError(
-                f"{recording.file}: no likely target/measured pair: no name says target, command, measured or "
+                "no likely target/measured pair: no name says target, command, measured or "
                 "feedback, and no two channels move alike",
+                file=recording.file,
                 advice="name them: {target}, {measured}",
             )
         (target, measured), correlation, lag = guess
@@ -187,7 +189,8 @@ def _by_name(named: list[_Named], channels: tuple[Channel, ...], file: str) -> l
             if not pairs:
                 listed = ", ".join(f"'{channels[one.index].name}'" for one in (*targets, *measured))
                 raise ChannelError(
-                    f"{file}: several channels could be target or measured: {listed}",
+                    f"several channels could be target or measured: {listed}",
+                    file=file,
                     advice="choose: {target}, {measured}",
                 )
             return [(t, m) for t, m in pairs if len(channels[t].values) == len(channels[m].values)] or pairs

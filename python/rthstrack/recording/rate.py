@@ -12,6 +12,7 @@ import numpy as np
 from rthstrack.errors import RecordingError
 from rthstrack.recording.readers.stamps import Irregular, Uniform, examine
 from rthstrack.recording.recording import _select
+from rthstrack.said import Said
 from rthstrack.units import seconds_in, split_unit
 
 if TYPE_CHECKING:
@@ -103,9 +104,9 @@ def _settle(contents: Contents, columns: Sequence[_TimeColumn], *, chosen: bool,
     if chosen:
         verdict = columns[0].examine()
         if isinstance(verdict, Irregular):
-            raise RecordingError(f"{file}: {columns[0].what} {verdict.problem}", advice=_hint(verdict))
+            raise RecordingError(f"{columns[0].what} {verdict.problem}", file=file, advice=_hint(verdict))
         ignored = [s for s in contents.statements if not _agree(verdict, s.rate_hz)]
-        said = tuple(f"{s.source} says {s.rate_hz:g} Hz, but the named time was followed" for s in ignored)
+        said = tuple(_not_followed(s.source, s.rate_hz, "named time") for s in ignored)
         return _Rate(verdict.rate_hz, columns[0].what, verdict.start_s, said)
     stated = _stated(contents, file)
     numeric = [column for column in columns if not column.is_clock]
@@ -123,7 +124,7 @@ def _settle(contents: Contents, columns: Sequence[_TimeColumn], *, chosen: bool,
         verdict = clock.examine()
         if rate is None:
             if isinstance(verdict, Irregular):
-                raise RecordingError(f"{file}: {clock.what} {verdict.problem}", advice=_hint(verdict))
+                raise RecordingError(f"{clock.what} {verdict.problem}", file=file, advice=_hint(verdict))
             rate = _Rate(verdict.rate_hz, clock.what)
         elif rate.hz is not None:
             notes += _compare_clock(rate, clock, verdict, file)
@@ -139,7 +140,8 @@ def _stated(contents: Contents, file: str) -> _Rate | None:
     for other in whole[1:]:
         if abs(other.rate_hz - whole[0].rate_hz) > _AGREEMENT * whole[0].rate_hz:
             raise RecordingError(
-                f"{file}: {whole[0].source} says {whole[0].rate_hz:g} Hz, but {other.source} says {other.rate_hz:g} Hz",
+                f"{whole[0].source} says {whole[0].rate_hz:g} Hz, but {other.source} says {other.rate_hz:g} Hz",
+                file=file,
                 advice="give {rate_hz}",
             )
     if whole:
@@ -164,7 +166,7 @@ def _told(columns: Sequence[_TimeColumn], stated: _Rate | None, file: str) -> _R
     if irregular and not uniform:
         column, problem = irregular[0]
         says = f"{stated.source} says {stated.hz:g} Hz, but " if stated and stated.hz else ""
-        raise RecordingError(f"{file}: {says}{column.what} {problem.problem}", advice=_hint(problem))
+        raise RecordingError(f"{says}{column.what} {problem.problem}", file=file, advice=_hint(problem))
     if not uniform:
         return None
     column, first = uniform[0]
@@ -172,7 +174,8 @@ def _told(columns: Sequence[_TimeColumn], stated: _Rate | None, file: str) -> _R
         for other, verdict in uniform:
             if not _agree(verdict, stated.hz):
                 raise RecordingError(
-                    f"{file}: {stated.source} says {stated.hz:g} Hz, but {other.what} says {verdict.rate_hz:g} Hz",
+                    f"{stated.source} says {stated.hz:g} Hz, but {other.what} says {verdict.rate_hz:g} Hz",
+                    file=file,
                     advice="give {rate_hz}",
                 )
     for other, verdict in uniform[1:]:
@@ -181,12 +184,13 @@ def _told(columns: Sequence[_TimeColumn], stated: _Rate | None, file: str) -> _R
                 None,
                 f"{column.what} says {first.rate_hz:g} Hz, but {other.what} {verdict.rate_hz:g} Hz",
             )
-    notes = [f"{c.what} {v.problem}; it was not used" for c, v in irregular]
+    notes: list[str] = [Said(f"{c.what} {v.problem}; it was not used", "irregular_time") for c, v in irregular]
     if first.rounded and first.high_hz - first.low_hz > 2e-3 * first.rate_hz:
-        notes.append(
+        words = (
             f"{column.what} is rounded: any rate from {first.low_hz:.6g} to {first.high_hz:.6g} Hz fits it; "
             "give the rate if you know better"
         )
+        notes.append(Said(words, "rounded_time", (first.low_hz, first.high_hz)))
     return _Rate(first.rate_hz, column.what, first.start_s, tuple(notes))
 
 
@@ -197,12 +201,12 @@ def _compare_clock(rate: _Rate, clock: _TimeColumn, verdict: Uniform | Irregular
         return []
     if isinstance(verdict, Irregular):
         if not math.isfinite(verdict.mean_rate_hz) or abs(verdict.mean_rate_hz - rate.hz) <= _AGREEMENT * rate.hz:
-            return [f"{clock.what} {verdict.problem}; {rate.source} was followed"]
+            return [Said(f"{clock.what} {verdict.problem}; {rate.source} was followed", "irregular_time")]
         says = verdict.mean_rate_hz
     else:
         says = verdict.rate_hz
     raise RecordingError(
-        f"{file}: {rate.source} says {rate.hz:g} Hz, but {clock.what} says {says:g} Hz", advice="give {rate_hz}"
+        f"{rate.source} says {rate.hz:g} Hz, but {clock.what} says {says:g} Hz", file=file, advice="give {rate_hz}"
     )
 
 
@@ -220,18 +224,22 @@ def _guessed(contents: Contents) -> _Rate | None:
 
 def _doubts(contents: Contents, columns: Sequence[_TimeColumn], rate_hz: float) -> list[str]:
     """What in the file contradicts a rate that the user gave."""
-    said = [
-        f"{s.source} says {s.rate_hz:g} Hz, but the given rate was followed"
+    said: list[str] = [
+        _not_followed(s.source, s.rate_hz, "given rate")
         for s in contents.statements
         if abs(s.rate_hz - rate_hz) > _AGREEMENT * rate_hz
     ]
     for column in columns:
         verdict = column.examine()
         if isinstance(verdict, Irregular):
-            said.append(f"{column.what} {verdict.problem}; the given rate was followed")
+            said.append(Said(f"{column.what} {verdict.problem}; the given rate was followed", "irregular_time"))
         elif not _agree(verdict, rate_hz):
-            said.append(f"{column.what} says {verdict.rate_hz:g} Hz, but the given rate was followed")
+            said.append(_not_followed(column.what, verdict.rate_hz, "given rate"))
     return said
+
+
+def _not_followed(source: str, rate_hz: float, followed: str) -> Said:
+    return Said(f"{source} says {rate_hz:g} Hz, but the {followed} was followed", "rate_not_followed", [rate_hz])
 
 
 def _agree(verdict: Uniform, rate_hz: float) -> bool:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rthstrack.errors import ChannelError, RecordingError, SettingError
+from rthstrack.said import Said
 from rthstrack.units import units_from_names
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ class Recording:
     """A file's channels, sampled at `rate_hz` (None if the file does not say) from `start_s` of its own time.
 
     `rate_source` says in words where the rate comes from, or why there is none. `notes` says what else was found,
-    left out or done; `n_filled` how many samples of which channel (by path) were filled.
+    left out or done, mostly with a code; `n_filled` how many samples of which channel (by path) were filled.
     """
 
     file: str
@@ -77,7 +78,8 @@ class Recording:
                 raise SettingError(f"scale: '{selector}' names channel '{old.path}', which is scaled already")
             unit = old.unit if abs(factor) == 1 else None
             channels[at] = replace(old, unit=unit, values=_frozen(old.values * factor))
-            notes.append(f"channel '{old.path}' scaled by {factor:g}" + (f" (was in {old.unit})" if old.unit else ""))
+            words = f"channel '{old.path}' scaled by {factor:g}" + (f" (was in {old.unit})" if old.unit else "")
+            notes.append(Said(words, "scaled", [factor]))
         return replace(self, channels=tuple(channels), notes=tuple(notes))
 
     def cut(self, start_s: float | None = None, end_s: float | None = None) -> Recording:
@@ -86,7 +88,7 @@ class Recording:
         Raises RecordingError without a rate or where nothing is left, SettingError for an impossible range.
         """
         if self.rate_hz is None:
-            raise RecordingError(f"{self.file}: cannot cut by time: {self.rate_source}", advice="give {rate_hz}")
+            raise RecordingError(f"cannot cut by time: {self.rate_source}", file=self.file, advice="give {rate_hz}")
         start = 0.0 if start_s is None else start_s
         end = math.inf if end_s is None else end_s
         if not (0 <= start < end):
@@ -98,16 +100,20 @@ class Recording:
         if first >= last:
             length = longest / self.rate_hz
             raise RecordingError(
-                f"{self.file}: nothing left between {start:g} and {end:g} s; the recording is {length:g} s long"
+                f"nothing left between {start:g} and {end:g} s; the recording is {length:g} s long", file=self.file
             )
         notes = [
             *self.notes,
-            f"cut to {first / self.rate_hz:g} s .. {last / self.rate_hz:g} s ({last - first} samples)",
+            Said(
+                f"cut to {first / self.rate_hz:g} s .. {last / self.rate_hz:g} s ({last - first} samples)",
+                "cut",
+                (first / self.rate_hz, last / self.rate_hz),
+            ),
         ]
         if end_s is not None and end_s * self.rate_hz > longest + 1e-6:
-            notes.append(
-                f"the recording ends at {longest / self.rate_hz:g} s, before the end of the cut at {end_s:g} s"
-            )
+            ends_s = longest / self.rate_hz
+            words = f"the recording ends at {ends_s:g} s, before the end of the cut at {end_s:g} s"
+            notes.append(Said(words, "cut_short", (ends_s, end_s)))
         channels = tuple(replace(c, values=_frozen(c.values[first:last].copy())) for c in self.channels)
         return replace(self, channels=channels, start_s=self.start_s + first / self.rate_hz, notes=tuple(notes))
 
@@ -125,7 +131,8 @@ class Recording:
             values, n_samples, n_gaps = _filled(old.values, max_gap_samples)
             if n_samples:
                 n_filled[old.path] = n_filled.get(old.path, 0) + n_samples
-                notes.append(f"channel '{old.path}': {n_samples} samples in {n_gaps} gap(s) filled by interpolation")
+                words = f"channel '{old.path}': {n_samples} samples in {n_gaps} gap(s) filled by interpolation"
+                notes.append(Said(words, "filled", (n_samples, n_gaps)))
             channels.append(replace(old, values=values))
         return replace(self, channels=tuple(channels), notes=tuple(notes), n_filled=MappingProxyType(n_filled))
 
@@ -174,16 +181,16 @@ def _select(selector: str, channels: Sequence[tuple[str, str]], file: str) -> in
         return matches[0]
     if matches:
         listed = ", ".join(f"#{i} '{channels[i][1]}'" for i in matches)
-        raise ChannelError(f"{file}: '{selector}' names {len(matches)} channels: {listed}; choose one by #index")
+        raise ChannelError(f"'{selector}' names {len(matches)} channels: {listed}; choose one by #index", file=file)
     listed = ", ".join(f"#{i} '{name}'" for i, (name, _) in enumerate(channels[:20]))
     listed += f" and {len(channels) - 20} more" if len(channels) > 20 else ""
     if index := re.fullmatch(r"#(\d{1,9})", selector.strip()):
         if int(index[1]) < len(channels):
             return int(index[1])
         raise ChannelError(
-            f"{file}: no channel '{selector}': there are {len(channels)}, #0 to #{len(channels) - 1}: {listed}"
+            f"no channel '{selector}': there are {len(channels)}, #0 to #{len(channels) - 1}: {listed}", file=file
         )
     by_text = {loose(text): i for i, both in enumerate(channels) for text in both}
     near = dict.fromkeys(by_text[text] for text in difflib.get_close_matches(loose(selector), by_text, n=3))
     meant = f" (did you mean {' or '.join(repr(channels[i][0]) for i in near)}?)" if near else ""
-    raise ChannelError(f"{file}: no channel '{selector}'{meant}; there are: {listed}")
+    raise ChannelError(f"no channel '{selector}'{meant}; there are: {listed}", file=file)

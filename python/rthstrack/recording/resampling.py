@@ -11,6 +11,7 @@ import numpy as np
 from rthstrack.errors import RecordingError, SettingError
 from rthstrack.recording.readers.stamps import Irregular
 from rthstrack.recording.recording import Recording, _channels
+from rthstrack.said import Said
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,14 +25,14 @@ def _resampled(contents: Contents, file: str, columns: Sequence[_TimeColumn], hz
     from scipy.interpolate import CubicSpline
 
     if not columns:
-        raise RecordingError(f"{file}: cannot resample: no time column", advice="name one: {time}, or give {rate_hz}")
+        raise RecordingError("cannot resample: no time column", file=file, advice="name one: {time}, or give {rate_hz}")
     column = columns[0]
     stamps = column.stamps * column.unit_s
     verdict = column.examine()
     if not (len(stamps) > 1 and np.isfinite(stamps).all() and np.all(np.diff(stamps) > 0)):
         problem = verdict.problem if isinstance(verdict, Irregular) else "does not increase"
         raise RecordingError(
-            f"{file}: cannot resample: expected stamps that increase strictly, but {column.what} {problem}"
+            f"cannot resample: expected stamps that increase strictly, but {column.what} {problem}", file=file
         )
     stamps = stamps - stamps[0]
     mean_hz = (len(stamps) - 1) / float(stamps[-1])
@@ -63,15 +64,20 @@ def _resampled(contents: Contents, file: str, columns: Sequence[_TimeColumn], hz
             values[~((finite[after] | on_left) & (finite[after - 1] | on_right))] = math.nan
         series.append(replace(one, values=values))
     if not series:
-        raise RecordingError(f"{file}: cannot resample: no channel has the {len(stamps)} samples of {column.what}")
+        raise RecordingError(f"cannot resample: no channel has the {len(stamps)} samples of {column.what}", file=file)
     steps = np.diff(stamps)
     notes = [
         *contents.notes,
-        f"resampled to {hz:g} Hz by cubic splines from {column.what}: "
-        f"steps of {steps.min():.6g} to {steps.max():.6g} s, mean {steps.mean():.6g} s",
+        Said(
+            f"resampled to {hz:g} Hz by cubic splines from {column.what}: "
+            f"steps of {steps.min():.6g} to {steps.max():.6g} s, mean {steps.mean():.6g} s",
+            "resampled",
+            (hz, steps.min(), steps.max(), steps.mean()),
+        ),
     ]
     if left_out:
-        notes.append(f"left out when resampling, for their length is not that of {column.what}: {', '.join(left_out)}")
+        words = f"left out when resampling, for their length is not that of {column.what}: {', '.join(left_out)}"
+        notes.append(Said(words, "not_resampled", [len(left_out)]))
     start = float(column.stamps[0]) * column.unit_s
     source = f"--resample, from {column.what}"
     return Recording(file, contents.format, _channels(contents, series), float(hz), source, start, tuple(notes))

@@ -30,17 +30,6 @@ if TYPE_CHECKING:
 
     from rthstrack.verdict.assessment import Assessment
 
-_INDICES = (
-    # name, field, unit, factor to the unit shown, field in percent, what it is
-    ("MTE", "max_tracking_error", "unit", 1.0, "max_tracking_error_percent", "of the largest {target}"),
-    ("RMS error", "rms_error", "unit", 1.0, "rms_error_percent", "of the RMS of {target}"),
-    ("TI", "tracking_indicator", "unit2", 1.0, None, "tracking indicator at the end, rises on lag"),
-    ("J1", "j1_s", "ms", 1e3, None, "lag of the correlation peak"),
-    ("J2", "j2_percent", "%", 1.0, None, "standard deviation of the error over that of {target}"),
-    ("J3", "j3_percent", "%", 1.0, None, "peak error over peak {target}"),
-    ("Energy error", "energy_error", "", 1.0, None, "work over {measured} less work over {target}"),
-)
-
 
 def write_report(assessments: Sequence[Assessment], path: str | Path) -> None:
     """Write the HTML report of one or several assessments to `path`.
@@ -313,7 +302,7 @@ def _limit(field: str, sign: str, found: float, limit: float | None, unit: str =
 def _index_tiles(a: Assessment, target_role: str, measured_role: str, reasons: Mapping[str, str]) -> str:
     units = {"unit": a.unit or "", "unit2": f"{a.unit}²" if a.unit else ""}
     tiles = []
-    for name, field, unit, factor, percent, meaning in _INDICES:
+    for name, field, unit, factor, percent, meaning, _ in display.INDICES:
         value = _number(field, getattr(a.indices, field), units.get(unit, unit), factor, reasons.get(field))
         note = meaning.format(target=target_role, measured=measured_role)
         if percent is not None:

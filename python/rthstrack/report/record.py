@@ -14,6 +14,7 @@ from rthstrack.verdict.entry import result_entry
 from rthstrack.verdict.sentence import reason
 
 if TYPE_CHECKING:
+    from rthstrack.said import Said
     from rthstrack.verdict.assessment import Assessment
 
 NOT_DETERMINED = "not determined"
@@ -79,6 +80,6 @@ def _reasons(a: Assessment) -> dict[str, str]:
     return reasons
 
 
-def _why(note: str | None) -> str:
+def _why(note: Said | None) -> str:
     """A note of the assessment as the reason alone; what it is the reason for is said where it is shown."""
-    return (note or "was not evaluated").removeprefix(f"{NOT_DETERMINED}: ")
+    return "was not evaluated" if note is None else note.cause

@@ -33,7 +33,7 @@ class StudiedSource:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """One evaluation of a study; what could not be determined is NaN, and `reason` says why.
+    """One evaluation of a study; what could not be determined is NaN, `reason` says why, and `reason_code` by name.
 
     Changes are relative to P = Q = 1 of the same source, window and weight power: value / reference - 1. The truth is
     that at the cell's own equivalent frequency; errors are value / truth - 1, and `delay_error_s` is delay less true
@@ -62,6 +62,7 @@ class Cell:
     delay_error_s: float = math.nan
     computing_time_s: float = math.nan
     reason: str = ""
+    reason_code: str = ""
     kind: str = "grid"
     tolerance: float = math.nan
     amplitude_bound: float = math.nan

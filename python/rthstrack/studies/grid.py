@@ -18,6 +18,7 @@ from rthstrack.errors import SettingError, SignalError
 from rthstrack.evaluation.factors import choose_factors, key_frequencies
 from rthstrack.evaluation.inputs import merged
 from rthstrack.evaluation.tracking import Evaluator, Tracking
+from rthstrack.said import Said, failed, of_core
 from rthstrack.studies.cells import Cell, StudiedSource, Study, _key
 from rthstrack.studies.pairs import _pairs
 from rthstrack.studies.settings import StudySettings
@@ -112,20 +113,21 @@ class _Steps:
             self._watcher(self._done, self._total)
 
 
-def _evaluated(pair: Pair, settings: Settings) -> Tracking | str:
+def _evaluated(pair: Pair, settings: Settings) -> Tracking | Said:
     """The result, or why there is none."""
     try:
         found = Evaluator(pair.target.size, pair.rate_hz, settings).evaluate(pair.target, pair.measured)
     except (SettingError, SignalError) as error:
-        return str(error)
+        return failed(error)
     undetermined = math.isnan(float(found.delay_s)) and found.reason
-    return str(found.reason).removeprefix("not determined: ") if undetermined else found
+    values: Any = found.reason_values
+    return of_core(str(found.reason), str(found.reason_code), values) if undetermined else found
 
 
-def _cell(pair: Pair, settings: Settings, found: Tracking | str, reference: Tracking | str) -> Cell:
+def _cell(pair: Pair, settings: Settings, found: Tracking | Said, reference: Tracking | Said) -> Cell:
     highest_hz = pair.rate_hz / (2 * settings.data_decimation)
-    if isinstance(found, str):
-        return Cell(pair.name, settings, highest_frequency_hz=highest_hz, reason=found)
+    if isinstance(found, Said):
+        return Cell(pair.name, settings, highest_frequency_hz=highest_hz, reason=found.cause, reason_code=found.code)
     amplitude, delay_s = float(found.amplitude), float(found.delay_s)
     frequency_hz = float(found.equivalent_frequency_hz)
     known = pair.truth(frequency_hz) if callable(pair.truth) else pair.truth
@@ -154,7 +156,7 @@ def _cell(pair: Pair, settings: Settings, found: Tracking | str, reference: Trac
 
 
 def _chosen_cell(
-    pair: Pair, kind: Settings, choose: tuple[str, ...], tolerance: float, reference: Tracking | str
+    pair: Pair, kind: Settings, choose: tuple[str, ...], tolerance: float, reference: Tracking | Said
 ) -> Cell:
     """The cell of the factors that `choose_factors` takes, with its bounds."""
     given: dict[str, Any] = {
@@ -164,7 +166,7 @@ def _chosen_cell(
     try:
         factors = choose_factors(pair.target, pair.measured, pair.rate_hz, tolerance=tolerance, settings=kind, **given)
     except (SettingError, SignalError) as error:
-        return dataclasses.replace(_cell(pair, kind, str(error), reference), kind="chosen", tolerance=tolerance)
+        return dataclasses.replace(_cell(pair, kind, failed(error), reference), kind="chosen", tolerance=tolerance)
     return dataclasses.replace(
         _cell(pair, factors.settings, _evaluated(pair, factors.settings), reference),
         kind="chosen",
@@ -175,13 +177,13 @@ def _chosen_cell(
     )
 
 
-def _key_cell(pair: Pair, kind: Settings, share: float, reference: Tracking | str) -> Cell:
+def _key_cell(pair: Pair, kind: Settings, share: float, reference: Tracking | Said) -> Cell:
     """The cell of the key frequencies of this pair's own target."""
     try:
         key = key_frequencies(pair.target, pair.rate_hz, share, kind)
         cell = _cell(pair, kind, key.evaluate(pair.target, pair.measured), reference)
     except (SettingError, SignalError) as error:
-        return dataclasses.replace(_cell(pair, kind, str(error), reference), kind="key", share=share)
+        return dataclasses.replace(_cell(pair, kind, failed(error), reference), kind="key", share=share)
     return dataclasses.replace(cell, kind="key", share=share, highest_frequency_hz=float(key.frequency_hz[-1]))
 
 

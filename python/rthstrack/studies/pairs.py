@@ -52,7 +52,7 @@ class Pair:
         try:
             evaluate(target, measured, rate_hz)
         except SignalError as error:
-            raise SignalError(f"{self.name}: {error}" if self.name else str(error)) from None
+            raise error.about(self.name) from None
         for name, value in (("target", target), ("measured", measured), ("rate_hz", rate_hz)):
             object.__setattr__(self, name, value)
 

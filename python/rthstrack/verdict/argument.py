@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rthstrack.evaluation.dependence import Dependence
     from rthstrack.evaluation.response import FrequencySlopes
     from rthstrack.evaluation.tracking import Tracking
+    from rthstrack.said import Said
 
 # An interval that reaches further than this share of the delay to either side says little of it.
 _WIDE_INTERVAL = 0.1
@@ -32,11 +33,11 @@ _CLEAR_OF_NOISE = 16.0
 # Ends this near to the mean, in standard deviations, are no cause.
 _AT_MEAN = 0.1
 
-# What to do where the reason itself does not say.
+# What to do where the reason itself does not say, by its code.
 _ADVICE = {
-    "too little motion to judge by": "; are these the right channels?",
-    "the iteration did not settle on a delay": "; judge only the frequencies at which target moves (--band)",
-    "measured moves against target": " (--scale CHANNEL=-1 turns one round)",
+    "still": "; are these the right channels?",
+    "no_convergence": "; judge only the frequencies at which target moves (--band)",
+    "opposite_sign": " (--scale CHANNEL=-1 turns one round)",
 }
 _NAMES = {
     "fei": "the published average",
@@ -52,11 +53,11 @@ def argument(
     depends: Dependence | None,
     slopes: FrequencySlopes | None,
     variants: Mapping[str, Tracking],
-    found: Mapping[str, str],
+    found: Mapping[str, Said],
     unit: str | None = None,
     start_s: float = 0.0,
 ) -> tuple[str, str | None]:
-    """In one sentence, which number to use and why; and the name of that warning of `found` which it says itself.
+    """In one sentence, which number to use and why; and the code of that warning of `found` which it says itself.
 
     `tracking` is the estimate asked for, with weights; `variants` are the same with one setting changed. `unit` is
     target's; `start_s` the time of the first sample.
@@ -69,7 +70,7 @@ def argument(
         return f"use the trusted estimate: {asked_for} is not determined: {missing}", None
     if depends is not None and (varying := _varying(depends, unit, start_s)) is not None:
         name, text = varying
-        return f"{text}; {_averages(tracking, trusted, name)}", "delay spread"
+        return f"{text}; {_averages(tracking, trusted, name)}", "delay_spread"
     if depends is None or depends.kind == "frequency":
         slowly = _varying_slowly(slopes)
     else:
@@ -90,20 +91,20 @@ def argument(
     else:
         gaps = [f"{_gap(name, tracking, trusted)}, {text}" for name, (_, _, text) in zip(which, causes, strict=True)]
     # What follows the target is told by how gain and delay change.
-    without = f"; {trusted.reason}" if trusted.reason and "follows target" not in str(trusted.reason) else ""
+    without = f"; {trusted.reason}" if trusted.reason_code not in ("", "residual_follows_target") else ""
     told = next((warning for _, warning, _ in causes if warning is not None), None)
     return f"use the trusted estimate: {ours} is {', and '.join(gaps)}{slowly}{without}", told
 
 
-def _advised(missing: str, trusted: Tracking) -> str:
+def _advised(missing: Said, trusted: Tracking) -> str:
     """Why there is no number, with what to do about it in the command's words."""
     settings, quarter_s = trusted.settings, trusted.n_samples / trusted.rate_hz / 4
-    if missing.startswith("the delay seems to lie beyond"):
+    if missing.code == "beyond_max_delay":
         if settings.max_delay_s < quarter_s:
             most = min(2 * settings.max_delay_s, quarter_s)
             return f"the delay seems to lie beyond max_delay_s, {settings.max_delay_s:g} s: try --max-delay {most:.3g}"
         return f"the delay seems to lie beyond a quarter of the record, {quarter_s:.3g} s: a longer one is needed"
-    return missing + next((advice for known, advice in _ADVICE.items() if missing.startswith(known)), "")
+    return missing + _ADVICE.get(missing.code, "")
 
 
 def _how_well(tracking: Tracking, trusted: Tracking) -> str:
@@ -158,7 +159,7 @@ def _cause(
     trusted: Tracking,
     name: str,
     variants: Mapping[str, Tracking],
-    found: Mapping[str, str],
+    found: Mapping[str, Said],
 ) -> tuple[str | None, str | None, str]:
     """Why one number misses the trusted one: what is to blame, the warning that says it, and the cause in words.
 
@@ -170,9 +171,9 @@ def _cause(
         # What averaging makes of a constant gain and delay, target's own noise and all, is taken off.
         readings["average"] = ours - averaged[1] + theirs
     remains = {change: abs(reading - theirs) / abs(ours - theirs) for change, reading in readings.items()}
-    if remains.get("bad samples", 1.0) < _EXPLAINED and "bad samples" in found:
+    if remains.get("bad_samples", 1.0) < _EXPLAINED and "bad_samples" in found:
         # All else that is tried still holds them.
-        return "bad samples", "bad samples", f"as {found['bad samples'].partition('; left out')[0]}"
+        return "bad_samples", "bad_samples", f"as {found['bad_samples'].cause}"
     suspects = [change for change in ("detrend", "window", "band") if remains.get(change, 1.0) < _EXPLAINED]
     if remains.get("average", 1.0) < _FORETOLD:
         suspects.append("average")
@@ -182,10 +183,10 @@ def _cause(
     if not suspects:
         return None, None, "which neither drift, window, noise nor wide phases explain alone"
     # Noise on target that is there, and explains it, needs no help by the record's ends.
-    noisy = "target noise" in found
+    noisy = "target_noise" in found
     by_bins = "average" in suspects or "band" in suspects
     if noisy and not by_bins and averaged is not None and abs(ours - averaged[1]) < _EXPLAINED * abs(ours - theirs):
-        return "target noise", None, "as target's own noise counts as motion"
+        return "target_noise", None, "as target's own noise counts as motion"
     first = [name for name in ("average", "band") if name in suspects and (noisy or name == "average")]
     cause = first[0] if first else min(suspects, key=remains.__getitem__)
     by_noise = 0.0
@@ -197,7 +198,7 @@ def _cause(
     if cause == "average":
         noise = "target's own noise counts as motion"
         if by_noise > 1 - _MINOR:
-            return "target noise", None, f"as {noise}"
+            return "target_noise", None, f"as {noise}"
         frequency, weights = _of_motion(target, tracking, trusted)
         low, high = (360 * abs(float(trusted.delay_s)) * edge for edge in _middle(frequency, weights))
         said = f"as it averages phases that spread from {_percent(low)} to {_percent(high)} degrees"
@@ -212,7 +213,7 @@ def _cause(
         return cause, None, f"as {where} on different points of both motions: with --estimator aligned {reading}"
     if cause == "band":
         low, high = variants["band"].settings.band_hz or (0.0, math.inf)
-        warning = "noise" if "noise" in found else None
+        warning = "high_energy" if "high_energy" in found else None
         return (
             cause,
             warning,
@@ -226,9 +227,9 @@ def _cause(
     if cause == "window" and window != "boxcar":
         return cause, None, f"as the {window} window acts on different points of both motions: with {remedy} {reading}"
     if "offset" in found:
-        return cause, "offset", f"as {found['offset']}: with {remedy} {reading}"
+        return cause, "offset", f"as {found['offset'].cause}: with {remedy} {reading}"
     if "drift" in found:
-        return cause, "drift", f"as {found['drift'].partition(': try')[0]}: with {remedy} {reading}"
+        return cause, "drift", f"as {found['drift'].cause}: with {remedy} {reading}"
     return cause, None, f"as {_ends_apart(target)}: with {remedy} {reading}"
 
 

@@ -18,6 +18,7 @@ from rthstrack.evaluation.inputs import _number, _single
 from rthstrack.evaluation.response import frequency_response, frequency_slopes
 from rthstrack.evaluation.settings import Settings
 from rthstrack.evaluation.tracking import Evaluator, bridged, evaluate_moving
+from rthstrack.said import failed
 from rthstrack.verdict.argument import argument as argued
 from rthstrack.verdict.difference import differ
 from rthstrack.verdict.display import signal_roles
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from rthstrack.evaluation.indices import IndexHistories, Indices
     from rthstrack.evaluation.response import FrequencyResponse, FrequencySlopes
     from rthstrack.evaluation.tracking import MovingTracking, Tracking
+    from rthstrack.said import Said
 
 #: Length of a moving window unless told otherwise, in seconds, but never more than a quarter of the record.
 MOVING_S = 4.0
@@ -51,6 +53,7 @@ class Assessment:
     `target` and `measured` are the raw samples, `unit` theirs; `time_s` starts at the recording's own start.
     `settings` holds what was done before the evaluation (cut, fill, resample, scale, rate and where it came from)
     and the evaluation's own settings. `exceeded` names each limit that was exceeded, in one sentence.
+    `warnings`, `exceeded` and the notes are texts with `code` and `values`.
     `tracking`, `moving` are of the estimator asked for; `trusted`, `trusted_moving` of least squares on every sample,
     the same object where that was asked for. `variants`: where both differ, `tracking` with one setting changed, by
     what was changed ("detrend", "window", "band", "estimator"). `argument` says in one sentence which to use, and why.
@@ -68,14 +71,14 @@ class Assessment:
     measured: NDArray[np.float64] = field(repr=False)
     tracking: Tracking  # evaluated with weights=True: spectra and weights inside
     moving: MovingTracking | None
-    moving_note: str | None  # why there is no moving evaluation, when there is none
+    moving_note: Said | None  # why there is no moving evaluation, when there is none
     trusted: Tracking
     trusted_moving: MovingTracking | None  # over the same windows
     variants: Mapping[str, Tracking]
     response: FrequencyResponse | None  # aligned at the slopes' delay, or the trusted one
-    response_note: str | None
+    response_note: Said | None
     slopes: FrequencySlopes | None
-    slopes_note: str | None
+    slopes_note: Said | None
     depends_on: str | None
     dependence: Dependence | None
     indices: Indices
@@ -83,9 +86,9 @@ class Assessment:
     settings: dict[str, Any]
     verdict: str
     argument: str
-    warnings: tuple[str, ...]
+    warnings: tuple[Said, ...]
     limits: Limits
-    exceeded: tuple[str, ...]
+    exceeded: tuple[Said, ...]
     factors: Factors | None = None  # P and Q with their bound, where the program chose them
 
 
@@ -152,8 +155,8 @@ def assess(
             trusted_moving = _moving(t, m, rate_hz, window_s, hop_s, of_trusted)
     except (SettingError, SignalError) as error:
         if asked:
-            raise type(error)(f"moving windows of {window_s:g} s: {error}") from None
-        moving, trusted_moving, moving_note = None, None, f"not determined: {error}"
+            raise error.reworded(f"moving windows of {window_s:g} s: {error}") from None
+        moving, trusted_moving, moving_note = None, None, failed(error)
     # Curves over frequency and what gain and delay depend on need every sample.
     raw, without_bad = (t, m), tracking
     if trusted.bad_samples:
@@ -167,7 +170,7 @@ def assess(
             t, m, rate_hz, band_hz=for_record.band_hz, align_s=float(trusted.delay_s) if explained else None
         )
     except (SettingError, SignalError) as error:
-        slopes_note = f"not determined: {error}"
+        slopes_note = failed(error)
     response, response_note = _response(t, m, rate_hz, slopes, trusted)
     depends = dependence(t, m, without_bad, trusted, response)
     t, m = raw
@@ -184,7 +187,7 @@ def assess(
     suspect = "mean" if "offset" in warnings and "drift" not in warnings else "linear"
     variants = _variants(t, m, tracking, of_trusted, slopes, suspect) if differ(tracking, trusted) else {}
     if without_bad is not tracking:
-        variants["bad samples"] = without_bad
+        variants["bad_samples"] = without_bad
     argument, said = argued(t, tracking, trusted, depends, slopes, variants, warnings, unit, start_s)
     evaluation = dataclasses.asdict(tracking.settings) | _factor_settings(factors)
     evaluation["expected_delay_s"] = of_trusted.expected_delay_s
@@ -218,7 +221,7 @@ def assess(
         argument=argument,
         warnings=(
             *unchecked(tracking, limits),
-            *(text for name, text in warnings.items() if name != said),
+            *(warning for code, warning in warnings.items() if code != said),
         ),
         limits=limits,
         exceeded=exceeded(tracking, limits),
@@ -226,12 +229,13 @@ def assess(
     )
 
 
-def _without_numbers(tracking: Tracking, why: str) -> Tracking:
+def _without_numbers(tracking: Tracking, why: Said) -> Tracking:
     """The same without gain and delay, for a reason that the estimate itself did not see."""
     names = ("amplitude", "phase_rad", "delay_s", "amplitude_std", "delay_std_s")
     nothing: dict[str, Any] = dict.fromkeys(names, math.nan)
-    interval = (math.nan, math.nan)
-    return dataclasses.replace(tracking, **nothing, amplitude_interval=interval, delay_interval_s=interval, reason=why)
+    nothing |= dict.fromkeys(("amplitude_interval", "delay_interval_s"), (math.nan, math.nan))
+    said: dict[str, Any] = {"reason": str(why), "reason_code": why.code, "reason_values": why.values}
+    return dataclasses.replace(tracking, **nothing, **said)
 
 
 def without_trusted(settings: Settings) -> Settings:
@@ -270,7 +274,7 @@ def _response(
     rate_hz: float,
     slopes: FrequencySlopes | None,
     trusted: Tracking,
-) -> tuple[FrequencyResponse | None, str | None]:
+) -> tuple[FrequencyResponse | None, Said | None]:
     """Gain and delay over frequency, segments aligned by what is known of the delay, or why there are none."""
     if slopes is not None:
         known_s, dispersion = slopes.align_s, slopes.dispersion
@@ -282,7 +286,7 @@ def _response(
         try:
             found = frequency_response(target, measured, rate_hz, align_s=align_s, dispersion=dispersion)
         except (SettingError, SignalError) as error:
-            note, unaligned = f"not determined: {error}", str(error)
+            note, unaligned = failed(error), str(error)
             continue
         return dataclasses.replace(found, unaligned=unaligned), None
     return None, note

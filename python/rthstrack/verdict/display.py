@@ -6,8 +6,7 @@ Nothing here changes a result; every function only chooses how a result is shown
 from __future__ import annotations
 
 import math
-import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,6 +27,19 @@ STRONGEST_S = 4.0
 
 #: Every estimator, and what it is called beside the others.
 ESTIMATORS = {"fei": "published", "aligned": "aligned", "least_squares": "least squares"}
+
+#: The indices as they are shown: short name, field, unit, factor to it, field in percent, what it is, name in a table.
+INDICES = (
+    ("MTE", "max_tracking_error", "unit", 1.0, "max_tracking_error_percent", "of the largest {target}",
+     "max tracking error"),
+    ("RMS error", "rms_error", "unit", 1.0, "rms_error_percent", "of the RMS of {target}", "rms error"),
+    ("TI", "tracking_indicator", "unit2", 1.0, None, "tracking indicator at the end, rises on lag",
+     "tracking indicator"),
+    ("J1", "j1_s", "ms", 1e3, None, "lag of the correlation peak", "J1, J2, J3"),
+    ("J2", "j2_percent", "%", 1.0, None, "standard deviation of the error over that of {target}", "J1, J2, J3"),
+    ("J3", "j3_percent", "%", 1.0, None, "peak error over peak {target}", "J1, J2, J3"),
+    ("Energy error", "energy_error", "", 1.0, None, "work over {measured} less work over {target}", "energy error"),
+)  # fmt: skip
 
 _ROLES = {"whole": ("target", "measured"), "compensator": ("target", "command"), "actuator": ("command", "measured")}
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -88,12 +100,11 @@ def with_interval(value: float, interval: Sequence[float], unit: str = "") -> st
 
 def reasons(moving: MovingTracking) -> list[tuple[int, str]]:
     """Why windows have no number or no interval: how many of each kind, most frequent first, and the first's words."""
-    kinds: dict[str, tuple[int, str]] = {}
-    for reason in moving.reason:
-        if reason:
-            kind = re.sub(r"-?\d[\d.]*", "", str(reason))
-            count, first = kinds.get(kind, (0, str(reason)))
-            kinds[kind] = (count + 1, first)
+    kinds: dict[Any, tuple[int, str]] = {}
+    for code, reason in zip(moving.reason_code, moving.reason, strict=True):
+        if code:
+            count, first = kinds.get(code, (0, str(reason)))
+            kinds[code] = (count + 1, first)
     return sorted(kinds.values(), key=lambda found: -found[0])
 
 

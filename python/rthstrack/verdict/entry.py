@@ -7,18 +7,21 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from rthstrack.evaluation.bad_samples import BadSamples
-from rthstrack.evaluation.results import json_ready
+from rthstrack.evaluation.results import NUMBERS, is_interval, json_ready
 from rthstrack.verdict.sentence import reason
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from rthstrack.evaluation.response import FrequencySlopes
     from rthstrack.evaluation.tracking import Tracking
+    from rthstrack.said import Said
     from rthstrack.verdict.assessment import Assessment
 
 
 def result_entry(a: Assessment) -> dict[str, Any]:
     """One result as `rthstrack evaluate --json` prints it: numbers at full precision, None where not determined."""
-    t, i = a.tracking, a.indices
+    t = a.tracking
     entry: dict[str, Any] = {
         "file": a.file,
         "actuator": a.actuator,
@@ -27,43 +30,40 @@ def result_entry(a: Assessment) -> dict[str, Any]:
         "unit": a.unit,
         "rate_hz": a.rate_hz,
         "n_samples": t.n_samples,
-        "amplitude": t.amplitude,
-        "delay_s": t.delay_s,
-        "phase_rad": t.phase_rad,
-        "equivalent_frequency_hz": t.equivalent_frequency_hz,
+        **numbers(t, NUMBERS[:4]),
         "n_bins": t.n_bins,
         "delta_f_hz": t.delta_f_hz,
-        **_precision(t),
-        "residual_coherence": t.residual_coherence,
-        "goodness": t.goodness,
-        "reason": reason(t),
+        **numbers(t, [name for name in NUMBERS[4:] if name not in OF_TRUSTED]),
+        **_told(reason(t)),
         "trusted": _trusted_entry(a.trusted),
         "slopes": _slopes_entry(a.slopes, a.slopes_note),
         "depends_on": a.depends_on,
         "dependence": None if a.dependence is None else a.dependence.to_dict(),
         "settings": a.settings,
-        "indices": {
-            "max_tracking_error": i.max_tracking_error,
-            "max_tracking_error_percent": i.max_tracking_error_percent,
-            "rms_error": i.rms_error,
-            "rms_error_percent": i.rms_error_percent,
-            "tracking_indicator": i.tracking_indicator,
-            "j1_s": i.j1_s,
-            "j2_percent": i.j2_percent,
-            "j3_percent": i.j3_percent,
-        },
+        # The force that others need is not given.
+        "indices": {name: value for name, value in dataclasses.asdict(a.indices).items() if value is not None},
         "argument": a.argument,
         "warnings": [*a.warnings, *a.exceeded],
+        "warning_codes": [{"code": said.code, "values": said.values} for said in (*a.warnings, *a.exceeded)],
     }
     return {key: json_ready(value) for key, value in entry.items()}
 
 
-def _precision(t: Tracking) -> dict[str, Any]:
+#: What is told of the trusted estimate alone.
+OF_TRUSTED = ("target_noise_std",)
+
+
+def numbers(t: Tracking, names: Iterable[str]) -> dict[str, Any]:
+    """The numbers of these names."""
+    return {name: _ends(getattr(t, name)) if is_interval(name) else getattr(t, name) for name in names}
+
+
+def _told(why: Said | None) -> dict[str, Any]:
+    """Why a number or an interval is missing, in words and as code and values."""
     return {
-        "amplitude_std": t.amplitude_std,
-        "amplitude_interval": _ends(t.amplitude_interval),
-        "delay_std_s": t.delay_std_s,
-        "delay_interval_s": _ends(t.delay_interval_s),
+        "reason": why,
+        "reason_code": None if why is None else why.code,
+        "reason_values": [] if why is None else why.values,
     }
 
 
@@ -76,13 +76,9 @@ def _ends(interval: Any) -> list[float] | None:
 def _trusted_entry(t: Tracking) -> dict[str, Any]:
     return {
         "estimator": t.settings.estimator,
-        "amplitude": t.amplitude,
-        "amplitude_interval": _ends(t.amplitude_interval),
-        "delay_s": t.delay_s,
-        "delay_interval_s": _ends(t.delay_interval_s),
-        "target_noise_std": t.target_noise_std,
+        **numbers(t, ("amplitude", "amplitude_interval", "delay_s", "delay_interval_s", *OF_TRUSTED)),
         "bad_samples": [dataclasses.asdict(bad) for bad in t.bad_samples if isinstance(bad, BadSamples)],
-        "reason": reason(t),
+        **_told(reason(t)),
     }
 
 
@@ -93,9 +89,9 @@ _SLOPES = (
 )  # fmt: skip
 
 
-def _slopes_entry(slopes: FrequencySlopes | None, note: str | None) -> dict[str, Any]:
+def _slopes_entry(slopes: FrequencySlopes | None, note: Said | None) -> dict[str, Any]:
     entry: dict[str, Any] = {name: None if slopes is None else getattr(slopes, name) for name in _SLOPES}
     for name in _SLOPES:
-        if slopes is not None and "interval" in name:
+        if slopes is not None and is_interval(name):
             entry[name] = _ends(entry[name])
-    return entry | {"reason": note}
+    return entry | _told(note)

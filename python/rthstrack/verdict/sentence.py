@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
+
+from rthstrack.said import Said, of_core, undetermined
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,7 +28,9 @@ def sentence(tracking: Tracking, target: str = "target", measured: str = "measur
     delay_s, amplitude = float(tracking.delay_s), float(tracking.amplitude)
     if math.isnan(delay_s):
         said = _undetermined(tracking)
-        return f"{measured} does not move: it has no delay" if said == _NO_MOTION else f"not determined: {said}"
+        if said is not None and (said.code, said.values) == _NO_MOTION:
+            return f"{measured} does not move: it has no delay"
+        return f"not determined: {said}"
     milliseconds = f"{1e3 * abs(delay_s):.3g} ms"
     if float(f"{1e3 * abs(delay_s):.3g}") == 0:
         timing = f"{measured} is in time with {target}"
@@ -43,39 +46,41 @@ def sentence(tracking: Tracking, target: str = "target", measured: str = "measur
     return f"{timing} and {size}, judged at {float(tracking.equivalent_frequency_hz):.2g} Hz"
 
 
-_NO_MOTION = "measured does not move"
+# What measured that does not move is called: nothing of it follows target.
+_NO_MOTION: tuple[str, tuple[float, ...]] = ("low_coherence", ())
+# Of so much uncertainty, in seconds, the core itself says no more than that.
+_BOUNDLESS_S = 1.0
 
 
-def reason(tracking: Tracking) -> str | None:
+def reason(tracking: Tracking) -> Said | None:
     """Why a number or its interval is missing; None where nothing is, and for the published estimator's intervals."""
-    said = str(tracking.reason)
-    if not said and math.isnan(float(tracking.delay_s)):
-        return f"not determined: {_NO_MOTION}"
+    code, values = str(tracking.reason_code), cast("tuple[float, ...]", tracking.reason_values)
+    if not tracking.reason:
+        return undetermined("measured does not move", *_NO_MOTION) if math.isnan(float(tracking.delay_s)) else None
     # So wide that the number means nothing but that.
-    uncertain = _UNCERTAIN.search(said)
-    if uncertain and float(uncertain[1]) > 1e3 * tracking.n_samples / tracking.rate_hz:
-        said = said.replace(uncertain[0], "noise hides the delay altogether")
-    return said or None
+    if code == "uncertain" and tracking.n_samples / tracking.rate_hz < values[0] <= _BOUNDLESS_S:
+        advice = "take a longer window or a band with less noise"
+        return undetermined(f"noise hides the delay altogether; {advice}", code, values)
+    return of_core(str(tracking.reason), code, values)
 
 
 def with_cause(tracking: Tracking, depends: Dependence | None) -> Tracking:
     """The same, its reason with the cause that was found: what noise on target leaves follows target, too."""
-    said = str(tracking.reason)
-    if _NOT_CONSTANT not in said:
+    if tracking.reason_code != "residual_follows_target":
         return tracking
     if depends is not None:
         over = {"amplitude": "amplitude", "frequency": "frequency"}.get(depends.kind, "time")
-        said = said.replace("over frequency or time", f"over {over}")
+        cause = f"so they are not constant over {over}"
     elif float(tracking.target_noise_std) > 0:
-        said = said.replace(_NOT_CONSTANT, ", as noise on target does")
-    return dataclasses.replace(tracking, reason=said)
+        cause = "as noise on target does"
+    else:
+        return tracking
+    (coherence,) = cast("tuple[float]", tracking.reason_values)
+    words = f"no interval: what one gain and one delay leave still follows target (coherence {coherence:.2f}), {cause}"
+    return dataclasses.replace(tracking, reason=words)
 
 
-_NOT_CONSTANT = ", so they are not constant over frequency or time"
-_UNCERTAIN = re.compile(r"noise leaves the delay uncertain by ([\d.]+) ms either way, more than half a turn")
-
-
-def still_in_band(target: NDArray[np.float64], tracking: Tracking) -> str | None:
+def still_in_band(target: NDArray[np.float64], tracking: Tracking) -> Said | None:
     """That target does not move in the band asked for: then gain and delay there are rounding's. Needs the spectra."""
     band, spectrum = tracking.settings.band_hz, tracking.target_spectrum
     if band is None or spectrum is None:
@@ -85,14 +90,14 @@ def still_in_band(target: NDArray[np.float64], tracking: Tracking) -> str | None
     squares = 2 * tracking.settings.frequency_decimation * float(np.sum(np.abs(spectrum) ** 2)) / n
     if squares > (_STILL * float(target.std())) ** 2 * target.size:
         return None
-    return f"not determined: target does not move between {band[0]:.3g} and {band[1]:.3g} Hz"
+    return undetermined(f"target does not move between {band[0]:.3g} and {band[1]:.3g} Hz", "still_in_band", band)
 
 
-def _undetermined(tracking: Tracking) -> str | None:
-    """Why there is no number; None where there is one."""
-    if not math.isnan(float(tracking.delay_s)):
+def _undetermined(tracking: Tracking) -> Said | None:
+    """Why there is no number, without a heading; None where there is one."""
+    if not math.isnan(float(tracking.delay_s)) or (why := reason(tracking)) is None:
         return None
-    return (reason(tracking) or "").removeprefix("not determined: ")
+    return Said(why.cause, why.code, why.values)
 
 
 def _percent(value: float) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rthstrack.evaluation.bad_samples import BadSamples
+from rthstrack.said import Said
 from rthstrack.units import length_factor
 from rthstrack.verdict.difference import _SAME_DELAY_S
 from rthstrack.verdict.sentence import _percent, _undetermined
@@ -56,34 +57,34 @@ def warnings(
     depends: Dependence | None = None,
     units: tuple[str | None, str | None] = (None, None),
     names: tuple[str, str] = ("target", "measured"),
-) -> dict[str, str]:
-    """What makes the numbers less trustworthy than they look, by name, most serious first.
+) -> dict[str, Said]:
+    """What makes the numbers less trustworthy than they look, by code, most serious first.
 
     `tracking` carries its weights.
     """
     duration_s = tracking.n_samples / tracking.rate_hz
     # Of these channels what is clipped or held is told already.
     told = {bad.channel for bad in _of_one(trusted) if bad.kind in ("clipped", "held")}
-    found = {
-        "units": _unlike_units(units, names),
-        "wrap": _wrap(tracking, names),
-        "amplitude": _odd_amplitude(tracking if math.isnan(float(trusted.amplitude)) else trusted, units),
-        "bad samples": _bad_samples(trusted, names),
-        "clipped target": _clipped(target, names[0]) if "target" not in told else None,
-        "clipped measured": _clipped(measured, names[1]) if "measured" not in told else None,
-        "offset": _offset(target, measured, trusted, rms_error_percent, units, names),
-        "drift": _drift(target, tracking, duration_s),
-        "noise": _high_energy(tracking),
-        "target noise": _target_noise(target, trusted, names),
-        "coherence": _coherence(tracking, response, names),
-        "delay spread": _delay_spread(tracking, trusted, response) if _by_frequency(depends) else None,
-        "levels": _levels(target, names[0]),
-        "quiet": _quiet(moving, names[0]),
-    }
-    return {name: text for name, text in found.items() if text}
+    found = (
+        _unlike_units(units, names),
+        _wrap(tracking, names),
+        _odd_amplitude(tracking if math.isnan(float(trusted.amplitude)) else trusted, units),
+        _bad_samples(trusted, names),
+        _clipped(target, names[0], "clipped_target") if "target" not in told else None,
+        _clipped(measured, names[1], "clipped_measured") if "measured" not in told else None,
+        _offset(target, measured, trusted, rms_error_percent, units, names),
+        _drift(target, tracking, duration_s),
+        _high_energy(tracking),
+        _target_noise(target, trusted, names),
+        _coherence(tracking, response, names),
+        _delay_spread(tracking, trusted, response) if _by_frequency(depends) else None,
+        _levels(target, names[0]),
+        _quiet(moving, names[0]),
+    )
+    return {warning.code: warning for warning in found if warning is not None}
 
 
-def _unlike_units(units: tuple[str | None, str | None], names: tuple[str, str]) -> str | None:
+def _unlike_units(units: tuple[str | None, str | None], names: tuple[str, str]) -> Said | None:
     target, measured = units
     if target is None or measured is None or target == measured:
         return None
@@ -91,25 +92,29 @@ def _unlike_units(units: tuple[str | None, str | None], names: tuple[str, str]) 
     if factor == 1:
         return None
     hint = f" (--scale '{names[1]}={factor:g}' brings it to {target})" if factor else " (use --scale)"
-    return f"unlike units: target is in {target}, measured in {measured}; amplitude is their raw ratio{hint}"
+    words = f"unlike units: target is in {target}, measured in {measured}; amplitude is their raw ratio{hint}"
+    return Said(words, "unlike_units", [factor] if factor else ())
 
 
-def _wrap(tracking: Tracking, names: tuple[str, str]) -> str | None:
+def _wrap(tracking: Tracking, names: tuple[str, str]) -> Said | None:
     phase = float(tracking.phase_rad)
     if not abs(phase) >= _WRAP_RAD:
         return None
     turn_s = 1 / float(tracking.equivalent_frequency_hz)
-    return (
+    return Said(
         f"phase {math.degrees(phase):.0f} degrees is near half a turn: the delay may be off by a whole turn "
-        f"({1e3 * turn_s:.0f} ms), or {names[1]} has the opposite sign (--scale '{names[1]}=-1')"
+        f"({1e3 * turn_s:.0f} ms), or {names[1]} has the opposite sign (--scale '{names[1]}=-1')",
+        "half_turn",
+        (phase, turn_s),
     )
 
 
-def _odd_amplitude(tracking: Tracking, units: tuple[str | None, str | None]) -> str | None:
+def _odd_amplitude(tracking: Tracking, units: tuple[str | None, str | None]) -> Said | None:
     amplitude = float(tracking.amplitude)
     if math.isnan(amplitude) or 1 / _ODD_AMPLITUDE < amplitude < _ODD_AMPLITUDE or units[0] != units[1]:
         return None
-    return f"amplitude {amplitude:.3g} is far from 1: are both channels displacements in the same unit? (--scale)"
+    words = f"amplitude {amplitude:.3g} is far from 1: are both channels displacements in the same unit? (--scale)"
+    return Said(words, "odd_amplitude", [amplitude])
 
 
 def _by_frequency(depends: Dependence | None) -> bool:
@@ -123,7 +128,7 @@ def _offset(
     rms_error_percent: float,
     units: tuple[str | None, str | None],
     names: tuple[str, str],
-) -> str | None:
+) -> Said | None:
     """That measured stands higher or lower than target, by more than gain and delay make it."""
     if _undetermined(trusted) is not None or units[0] != units[1]:
         return None
@@ -134,13 +139,15 @@ def _offset(
     unit = f" {units[0]}" if units[0] else ""
     where = "higher" if off > 0 else "lower"
     much = f"{rms_error_percent / 100:.3g} times target's rms" if rms_error_percent >= 1000 else ""
-    return (
+    return Said(
         f"{names[1]} stands {abs(off):.4g}{unit} {where} than {names[0]}, which makes the rms error "
-        f"{much or _percent(rms_error_percent) + ' %'}"
+        f"{much or _percent(rms_error_percent) + ' %'}",
+        "offset",
+        (off, rms_error_percent / 100),
     )
 
 
-def _drift(target: NDArray[np.float64], tracking: Tracking, duration_s: float) -> str | None:
+def _drift(target: NDArray[np.float64], tracking: Tracking, duration_s: float) -> Said | None:
     frequency, weights = tracking.frequency_hz, tracking.weights
     if frequency is None or weights is None or tracking.settings.detrend == "linear":
         return None
@@ -160,13 +167,11 @@ def _drift(target: NDArray[np.float64], tracking: Tracking, duration_s: float) -
     if not blame:
         return None
     remedy = "--detrend linear" if residual > _OFFSET_STD * spread else "--detrend mean"
-    return (
-        f"{' and '.join(blame)} puts {100 * share:.0f} % of the weight below {edge:.2g} Hz, where phase says little: "
-        f"try {remedy} or --band"
-    )
+    cause = f"{' and '.join(blame)} puts {100 * share:.0f} % of the weight below {edge:.2g} Hz, where phase says little"
+    return Said(f"{cause}: try {remedy} or --band", "drift", (share, edge), cause)
 
 
-def _high_energy(tracking: Tracking) -> str | None:
+def _high_energy(tracking: Tracking) -> Said | None:
     frequency, weights = tracking.frequency_hz, tracking.weights
     if frequency is None or weights is None:
         return None
@@ -174,24 +179,28 @@ def _high_energy(tracking: Tracking) -> str | None:
     share = float(weights[frequency > edge].sum())
     if share < _HIGH_SHARE:
         return None
-    return (
+    return Said(
         f"{100 * share:.1f} % of the weight lies above {edge:.3g} Hz, far above the response: "
-        f"noise there counts as motion; try --band or -P"
+        f"noise there counts as motion; try --band or -P",
+        "high_energy",
+        (share, edge),
     )
 
 
-def _target_noise(target: NDArray[np.float64], trusted: Tracking, names: tuple[str, str]) -> str | None:
+def _target_noise(target: NDArray[np.float64], trusted: Tracking, names: tuple[str, str]) -> Said | None:
     """That the trusted estimate had to reckon with noise on the target, where that is worth a word."""
     noise, spread = float(trusted.target_noise_std), float(target.std())
     # What is too fast to be read between samples cannot be told from noise.
-    if not noise > 0 or "too fast" in str(trusted.reason):
+    if not noise > 0 or trusted.reason_code == "too_fast":
         return None
     steps = max(float(np.mean(np.diff(target) ** 2)) - 2 * noise**2, 0.0)
     if noise < _TARGET_NOISE * spread and _PULL * noise**2 < _SAME_DELAY_S * trusted.rate_hz * steps:
         return None
-    return (
+    return Said(
         f"{names[0]} holds noise of its own, {_percent(100 * noise / spread)} % of its standard deviation: the trusted "
-        "estimate takes it into account, the published average does not (--band leaves less of it)"
+        "estimate takes it into account, the published average does not (--band leaves less of it)",
+        "target_noise",
+        [noise / spread],
     )
 
 
@@ -203,7 +212,7 @@ def _weighted(tracking: Tracking, response: FrequencyResponse) -> NDArray[np.flo
     return np.where(judged, response.target_psd, 0.0)
 
 
-def _coherence(tracking: Tracking, response: FrequencyResponse | None, names: tuple[str, str]) -> str | None:
+def _coherence(tracking: Tracking, response: FrequencyResponse | None, names: tuple[str, str]) -> Said | None:
     if response is None or tracking.frequency_hz is None:
         return None
     weight = _weighted(tracking, response)
@@ -212,13 +221,15 @@ def _coherence(tracking: Tracking, response: FrequencyResponse | None, names: tu
     coherence = float((weight * np.nan_to_num(response.coherence)).sum() / weight.sum())
     if coherence >= _COHERENT:
         return None
-    return (
+    return Said(
         f"coherence is only {coherence:.2f} over the frequencies that carry the weight: "
-        f"{names[1]} holds much that does not come from {names[0]}"
+        f"{names[1]} holds much that does not come from {names[0]}",
+        "coherence",
+        [coherence],
     )
 
 
-def _delay_spread(tracking: Tracking, trusted: Tracking, response: FrequencyResponse | None) -> str | None:
+def _delay_spread(tracking: Tracking, trusted: Tracking, response: FrequencyResponse | None) -> Said | None:
     """Whether the delay at the frequencies that carry the middle nine tenths of the energy is one number."""
     # A sign or a turn that is not known makes any delay a curve.
     if response is None or tracking.frequency_hz is None or _undetermined(trusted) is not None:
@@ -235,9 +246,11 @@ def _delay_spread(tracking: Tracking, trusted: Tracking, response: FrequencyResp
     # Less than a hundredth of a turn at the top is no finding.
     if high - low < max(_DELAY_SPREAD * abs(float(tracking.delay_s)), 0.01 / float(frequency[-1])):
         return None
-    return (
+    return Said(
         f"the delay is not one number: {1e3 * low:.3g} to {1e3 * high:.3g} ms between {frequency[0]:.2g} and "
-        f"{frequency[-1]:.2g} Hz; quote the curve of delay over frequency beside it"
+        f"{frequency[-1]:.2g} Hz; quote the curve of delay over frequency beside it",
+        "delay_spread",
+        (low, high),
     )
 
 
@@ -254,7 +267,7 @@ _BAD_WORDS = {
 }
 
 
-def _bad_samples(trusted: Tracking, names: tuple[str, str]) -> str | None:
+def _bad_samples(trusted: Tracking, names: tuple[str, str]) -> Said | None:
     """What is wrong with which samples, and from when."""
     said = []
     left_out = False
@@ -268,8 +281,9 @@ def _bad_samples(trusted: Tracking, names: tuple[str, str]) -> str | None:
         left_out = True
     if not said:
         return None
+    cause = "; ".join(said)
     end = "; left out of the trusted estimate, not of the published average (--bad-samples keep keeps them)"
-    return "; ".join(said) + (end if left_out else "")
+    return Said(cause + (end if left_out else ""), "bad_samples", [bad.count for bad in _of_one(trusted)], cause)
 
 
 def _ordinal(n: int) -> str:
@@ -277,7 +291,7 @@ def _ordinal(n: int) -> str:
     return f"{n}{ending}"
 
 
-def _clipped(signal: NDArray[np.float64], name: str) -> str | None:
+def _clipped(signal: NDArray[np.float64], name: str, code: str) -> Said | None:
     """A signal that runs into its extreme at speed and stays there; a quantised peak is reached slowly."""
     mean, spread = float(signal.mean()), float(signal.std())
     steps = np.abs(np.diff(signal))
@@ -301,11 +315,12 @@ def _clipped(signal: NDArray[np.float64], name: str) -> str | None:
         hits &= apart > _CLIPPED_LEVELS * level
         if hits.any():
             n_clipped = int(lengths[hits].sum())
-            return f"{name} looks clipped: {n_clipped} samples stay exactly at its extreme {extreme:g}"
+            words = f"{name} looks clipped: {n_clipped} samples stay exactly at its extreme {extreme:g}"
+            return Said(words, code, (n_clipped, extreme))
     return None
 
 
-def _levels(target: NDArray[np.float64], name: str) -> str | None:
+def _levels(target: NDArray[np.float64], name: str) -> Said | None:
     # Counting stops as soon as there are enough.
     if np.unique(target[: 20 * _FEW_LEVELS]).size > _FEW_LEVELS or (n := np.unique(target).size) > _FEW_LEVELS:
         return None
@@ -315,16 +330,19 @@ def _levels(target: NDArray[np.float64], name: str) -> str | None:
     # What jumps through most of its range at once is a square wave.
     if float(np.median(steps[steps > 0])) > 0.5 * float(np.ptp(target)):
         return None
-    return f"{name} is small: it takes only {n} distinct values, so quantisation limits what can be said"
+    words = f"{name} is small: it takes only {n} distinct values, so quantisation limits what can be said"
+    return Said(words, "few_levels", [n])
 
 
-def _quiet(moving: MovingTracking | None, name: str) -> str | None:
+def _quiet(moving: MovingTracking | None, name: str) -> Said | None:
     if moving is None or moving.valid.size == 0:
         return None
-    share = float(np.mean(["too little motion" in str(why) for why in moving.reason]))
+    share = float(np.mean([code == "still" for code in moving.reason_code]))
     if share < 0.5:
         return None
-    return (
+    return Said(
         f"{name} is nearly still in {100 * share:.0f} % of the windows: the numbers speak for the rest "
-        f"(--start and --end cut the record)"
+        f"(--start and --end cut the record)",
+        "quiet",
+        [share],
     )

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from rthstrack._core import _Matrices as Matrices
+
     Floats = NDArray[np.float64]
 
 
@@ -139,7 +141,13 @@ class Structure:
     @classmethod
     def none(cls) -> Structure:
         """No structure, of no degrees of freedom: what a test of actuators alone has."""
-        empty = np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(0)
+        nothing = np.zeros((0, 0))
+        empty: Matrices = {
+            "mass_kg": nothing,
+            "damping_n_s_per_m": nothing,
+            "stiffness_n_per_m": nothing,
+            "natural_frequencies_hz": np.zeros(0),
+        }
         return cls._built((empty, []), np.zeros(0), {})
 
     @property
@@ -191,17 +199,17 @@ class Structure:
     @classmethod
     def _built(
         cls,
-        found: tuple[tuple[Floats, Floats, Floats, Floats] | None, list[tuple[str, str]]],
+        found: tuple[Matrices | None, list[tuple[str, str]]],
         influence: Floats,
         table: dict[str, object],
     ) -> Structure:
         matrices, mistakes = found
         if matrices is None:
             raise ConfigurationError("", mistakes)
-        mass, damping, stiffness, frequencies = matrices
-        for array in (*matrices, influence):
+        arrays: dict[str, Any] = {**matrices, "influence": influence}
+        for array in arrays.values():
             array.flags.writeable = False
-        return cls(mass, damping, stiffness, influence, frequencies, table)
+        return cls(**arrays, description=table)
 
 
 @dataclass(frozen=True, slots=True)

@@ -68,7 +68,7 @@ def write_run(run: Run, path: str | os.PathLike[str], *, motion: Mapping[str, An
         temporary.replace(target)
     except OSError as error:
         why = os.strerror(error.errno) if error.errno else error
-        raise RecordingError(f"{target}: cannot be written: {why}") from None
+        raise RecordingError(f"cannot be written: {why}", file=target) from None
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -80,7 +80,7 @@ def read_run_test(path: str | os.PathLike[str]) -> VirtualTest | None:
     """
     file = os.fspath(path)
     if not Path(file).is_file():
-        raise RecordingError(f"{file}: no such file")
+        raise RecordingError("no such file", file=file)
     if not h5py.is_hdf5(file):
         return None
     try:
@@ -97,10 +97,10 @@ def read_run_test(path: str | os.PathLike[str]) -> VirtualTest | None:
         (key, message), *more = error.mistakes
         others = f" (and {len(more)} more)" if more else ""
         raise RecordingError(
-            f"{file}: its configuration cannot be used ({written}): {key}: {message}{others}"
+            f"its configuration cannot be used ({written}): {key}: {message}{others}", file=file
         ) from None
     except (ValueError, AttributeError) as error:
-        raise RecordingError(f"{file}: its configuration is damaged ({written}): {error}") from None
+        raise RecordingError(f"its configuration is damaged ({written}): {error}", file=file) from None
 
 
 def _channels(run: Run) -> dict[str, tuple[NDArray[np.float64], str]]:

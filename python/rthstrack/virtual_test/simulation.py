@@ -6,7 +6,7 @@ import math
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 import numpy as np
 
@@ -68,7 +68,7 @@ def simulate(
         ground = motion.resampled(test.rate_hz, duration_s)
         acceleration, notes = np.ascontiguousarray(ground.acceleration_m_s2), ground.notes
         signals, left = plan.run(acceleration, _noise(test, len(acceleration)))
-        critical = CriticalDelay(*plan.critical_delay()) if len(test.actuators) == 1 else None
+        critical = CriticalDelay(**plan.critical_delay()) if len(test.actuators) == 1 else None
     else:
         if test.structure.n_dof:
             raise ConfigurationError("", [("structure", "expected none where a target is given: actuators alone")])
@@ -80,25 +80,22 @@ def simulate(
         raise UnstableError(
             f"a displacement exceeded {bound_m:.4g} m", time_s, None if critical is None else critical.delay_s
         )
-    *channels, displacement, steps, error = signals
-    for array in (*channels, displacement):
+    names: tuple[Literal["target", "command", "measured", "force"], ...] = ("target", "command", "measured", "force")
+    for array in (*(signals[name] for name in names), signals["displacement"]):
         array.flags.writeable = False
-    target, command, measured, force = (c[:, 0] if c.shape[1] == 1 else c for c in channels)
+    channels = {name: c[:, 0] if (c := signals[name]).shape[1] == 1 else c for name in names}
     return Run(
-        test,
-        test.rate_hz,
-        target,
-        command,
-        measured,
-        force,
-        displacement,
-        acceleration,
-        motion.name,
-        notes,
-        steps,
-        error,
-        critical,
-        target_motion,
+        test=test,
+        rate_hz=test.rate_hz,
+        **channels,
+        displacement=signals["displacement"],
+        ground_motion=acceleration,
+        motion_name=motion.name,
+        motion_notes=notes,
+        steps_per_sample=signals["steps_per_sample"],
+        error_estimate=signals["error_estimate"],
+        critical_delay=critical,
+        target_motion=target_motion,
     )
 
 
@@ -130,7 +127,7 @@ def critical_delay(test: VirtualTest) -> CriticalDelay:
     and a specimen that is all of an SDOF's stiffness it is about 2 zeta / omega.
     Raises ConfigurationError, also with several actuators.
     """
-    return CriticalDelay(*_plan(test).critical_delay())
+    return CriticalDelay(**_plan(test).critical_delay())
 
 
 def delay_damping(test: VirtualTest, delay_s: float) -> DelayDamping:
@@ -139,7 +136,7 @@ def delay_damping(test: VirtualTest, delay_s: float) -> DelayDamping:
     The roots of the delayed characteristic equation, and the first-order estimate -(K k_e / k) omega tau / 2.
     Raises ConfigurationError, also with several actuators.
     """
-    return DelayDamping(*_plan(test).delay_damping(float(delay_s)))
+    return DelayDamping(**_plan(test).delay_damping(float(delay_s)))
 
 
 def true_tracking(

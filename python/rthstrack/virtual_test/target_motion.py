@@ -392,7 +392,7 @@ def read_target(
     try:
         return RecordedTarget(Path(path).stem, read.values, read.rate_hz, read.source, read.notes, ramp_s, table)
     except SettingError as error:
-        raise RecordingError(f"{path}: {read.channel}: {error}") from None
+        raise RecordingError(f"{read.channel}: {error}", file=path) from None
 
 
 # Configurations -------------------------------------------------------------------------------------------------------

@@ -607,7 +607,7 @@ impl Alignment {
             state.target_noise = motion.noise;
             found = self.judge(state, judged);
         }
-        found.map(|tracking| Tracking { target_noise: motion.noise.sqrt(), ..tracking })
+        found.map(|tracking| Tracking { target_noise_std: motion.noise.sqrt(), ..tracking })
     }
 
     /// The same at one of the lower rates; `noise` is the variance of the target's own.

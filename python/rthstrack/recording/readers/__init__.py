@@ -133,8 +133,9 @@ def read_contents(path: str | os.PathLike[str]) -> Contents:
 
 def _error(path: str | os.PathLike[str], what: object) -> RecordingError:
     """One printable line that begins with the file."""
-    line = printable(f"{os.fspath(path)}: {what}")
-    return RecordingError(line if len(line) <= 1000 else line[:997] + "...")
+    file, words = printable(os.fspath(path)), printable(str(what))
+    room = max(1000 - len(f"{file}: "), 3)
+    return RecordingError(words if len(words) <= room else words[: room - 3] + "...", file=file)
 
 
 def _first_line(cause: object) -> str:
