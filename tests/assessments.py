@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rthstrack.said import undetermined
 from rthstrack.verdict import Assessment, Limits, assess
 
 Signal = NDArray[np.float64]
@@ -32,9 +33,12 @@ def judged(
     if warnings is not None:
         changes["warnings"] = warnings
     if not moving_evaluation:
-        changes |= {"moving": None, "moving_note": "not determined: the record is shorter than two windows"}
+        changes |= {"moving": None, "moving_note": undetermined("the record is shorter than two windows", "setting")}
     if not response:
-        changes |= {"response": None, "response_note": "not determined: the record is too short for two segments"}
+        changes |= {
+            "response": None,
+            "response_note": undetermined("the record is too short for two segments", "too_short"),
+        }
     return dataclasses.replace(found, **changes)
 
 
@@ -86,4 +90,5 @@ def without_a_number(assessment: Assessment) -> Assessment:
     """The same with a delay that could not be determined."""
     why = "not determined: the iteration did not settle on a delay"
     tracking = dataclasses.replace(assessment.tracking, delay_s=float("nan"), phase_rad=float("nan"), reason=why)
+    tracking = dataclasses.replace(tracking, reason_code="no_convergence")
     return dataclasses.replace(assessment, tracking=tracking, verdict="no delay can be told")

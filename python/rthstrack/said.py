@@ -54,6 +54,6 @@ def of_core(words: str, code: str, values: Iterable[float]) -> Said:
     return Said(words, code, values, words.partition(": ")[2])
 
 
-def coded(words: str, code: str) -> Said:
-    """A text with its code, or with this one where it has none."""
+def coded(words: str, code: str = "note") -> Said:
+    """A text with its code, or with this one where it has none: a reader's note, or what a caller put there."""
     return words if isinstance(words, Said) else Said(words, code)

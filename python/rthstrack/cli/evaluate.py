@@ -182,7 +182,7 @@ def _assess(
     if proposal is not None and part == "whole":
         words = f"no channels were named: judged target '{asked.name}', measured '{answered.name}' ({proposal})"
         said.insert(0, Said(words, "channels_proposed"))
-    said += [coded(note, "note") for note in recording.notes] if part == "whole" else []
+    said += map(coded, recording.notes if part == "whole" else ())
     return dataclasses.replace(assessment, warnings=tuple(said))
 
 

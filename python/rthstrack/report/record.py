@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rthstrack.evaluation.results import json_ready
+from rthstrack.said import coded
 from rthstrack.verdict import display
 from rthstrack.verdict.entry import result_entry
 from rthstrack.verdict.sentence import reason
@@ -82,4 +83,4 @@ def _reasons(a: Assessment) -> dict[str, str]:
 
 def _why(note: Said | None) -> str:
     """A note of the assessment as the reason alone; what it is the reason for is said where it is shown."""
-    return "was not evaluated" if note is None else note.cause
+    return "was not evaluated" if note is None else coded(note).cause

@@ -101,10 +101,12 @@ def with_interval(value: float, interval: Sequence[float], unit: str = "") -> st
 def reasons(moving: MovingTracking) -> list[tuple[int, str]]:
     """Why windows have no number or no interval: how many of each kind, most frequent first, and the first's words."""
     kinds: dict[Any, tuple[int, str]] = {}
-    for code, reason in zip(moving.reason_code, moving.reason, strict=True):
+    for code, values, reason in zip(moving.reason_code, moving.reason_values, moving.reason, strict=True):
         if code:
-            count, first = kinds.get(code, (0, str(reason)))
-            kinds[code] = (count + 1, first)
+            # Measured that does not move has the code of one that does not follow, but no share that does.
+            kind = (code, len(values))
+            count, first = kinds.get(kind, (0, str(reason)))
+            kinds[kind] = (count + 1, first)
     return sorted(kinds.values(), key=lambda found: -found[0])
 
 

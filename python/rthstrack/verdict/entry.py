@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rthstrack.evaluation.bad_samples import BadSamples
 from rthstrack.evaluation.results import NUMBERS, is_interval, json_ready
+from rthstrack.said import coded
 from rthstrack.verdict.sentence import reason
 
 if TYPE_CHECKING:
@@ -44,7 +45,9 @@ def result_entry(a: Assessment) -> dict[str, Any]:
         "indices": {name: value for name, value in dataclasses.asdict(a.indices).items() if value is not None},
         "argument": a.argument,
         "warnings": [*a.warnings, *a.exceeded],
-        "warning_codes": [{"code": said.code, "values": said.values} for said in (*a.warnings, *a.exceeded)],
+        "warning_codes": [
+            {"code": said.code, "values": said.values} for said in map(coded, (*a.warnings, *a.exceeded))
+        ],
     }
     return {key: json_ready(value) for key, value in entry.items()}
 
@@ -60,11 +63,10 @@ def numbers(t: Tracking, names: Iterable[str]) -> dict[str, Any]:
 
 def _told(why: Said | None) -> dict[str, Any]:
     """Why a number or an interval is missing, in words and as code and values."""
-    return {
-        "reason": why,
-        "reason_code": None if why is None else why.code,
-        "reason_values": [] if why is None else why.values,
-    }
+    if why is None:
+        return {"reason": None, "reason_code": None, "reason_values": []}
+    why = coded(why)
+    return {"reason": why, "reason_code": why.code, "reason_values": why.values}
 
 
 def _ends(interval: Any) -> list[float] | None:
