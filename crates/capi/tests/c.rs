@@ -173,7 +173,7 @@ fn readings_of_the_core(seconds: usize) -> Vec<Reading> {
         gain: 1.0,
         delay: Delay::Constant(0.0),
         dynamics: Dynamics::ServoHydraulic(ServoHydraulic::default()),
-        compensation: Compensation::None,
+        compensation: Compensation::NONE,
         command_converter: Converter::default(),
         displacement_sensor: Converter::default(),
         force_sensor: Converter::default(),

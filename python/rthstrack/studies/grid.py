@@ -19,7 +19,7 @@ from rthstrack.evaluation.factors import TOLERANCE, choose_factors, key_frequenc
 from rthstrack.evaluation.settings import Settings
 from rthstrack.evaluation.tracking import Evaluator, Tracking
 from rthstrack.studies.cells import Cell, StudiedSource, Study, _key
-from rthstrack.studies.pairs import _pairs
+from rthstrack.studies.pairs import pairs_of
 from rthstrack.studies.settings import WEIGHT_POWERS, WINDOWS, StudySettings
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def study(
         noise_ratio,
         bad_samples,
     ).checked()
-    pairs = _pairs(sources, truth)
+    pairs = pairs_of(sources, truth)
     grid, kinds = settings._grid(), settings._kinds()
     extras = [("chosen", math.nan)] * bool(settings.choose) + [("key", share) for share in settings.shares]
     # The changes need P = Q = 1 where the grid lacks it. Pairs of one length share a plan: they follow each other.
