@@ -8,7 +8,7 @@ use std::hint::black_box;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use rthstrack::{Estimator, Monitor, MonitorConfig};
+use rthstrack::{Estimator, EvaluatorConfig, Monitor, MonitorConfig};
 
 /// Counts the bytes in use, to state what a state takes.
 struct Counting;

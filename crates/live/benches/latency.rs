@@ -45,7 +45,7 @@ fn measured(estimator: Estimator, seconds: f64) -> Value {
     live.stop();
     let lost = live.summary().totals.tally.lost;
     json!({
-        "bench": "latency", "estimator": estimator, "seconds": seconds, "readings": readings.len(), "lost": lost,
+        "bench": "latency", "estimator": estimator.code(), "seconds": seconds, "readings": readings.len(), "lost": lost,
         "round_trip_us": shares(&readings, &sent), "echo_round_trip_us": shares(&echoes, &sent_to_echo),
     })
 }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
+use rthstrack::{EvaluatorConfig, MonitorConfig};
 use rthstrack_live::{Live, LiveConfig};
 use serde_json::json;
 
@@ -16,15 +17,15 @@ fn main() {
     let numbers: Vec<f64> = std::env::args().skip(1).filter_map(|a| a.parse().ok()).collect();
     let argument = |i: usize, usual: f64| numbers.get(i).copied().unwrap_or(usual);
     let (seconds, garbage_hz, decimation) = (argument(0, 20.0).min(3600.0), argument(1, 0.0), argument(2, 1.0));
-    let monitor = json!({
-        "rate_hz": RATE_HZ, "window_s": 4.0, "update_hz": 64, "band_hz": [0, 32], "n_actuators": N_ACTUATORS,
-        "data_decimation": decimation,
-    });
+    let usual = MonitorConfig::default();
+    let (band_hz, data_decimation) = (Some((0.0, 32.0)), decimation as usize);
+    let evaluator = EvaluatorConfig { band_hz, data_decimation, ..usual.evaluator };
+    let monitor = MonitorConfig { rate_hz: RATE_HZ, n_actuators: N_ACTUATORS, evaluator, ..usual };
     let source = json!({"kind": "udp", "address": "127.0.0.1:0"});
     let alarms = json!({"limit_delay_s": 0.05, "limit_amplitude": 0.5, "critical_delay_s": 0.1, "limit_lost": 1000});
     let sink = UdpSocket::bind("127.0.0.1:0").expect("a port");
     let outputs = json!({"readings_udp": sink.local_addr().expect("bound").to_string(), "log": true, "page": true});
-    let config = LiveConfig::read(&monitor, &source, &alarms, &outputs).expect("settings");
+    let config = LiveConfig::read((monitor, Vec::new()), &source, &alarms, &outputs).expect("settings");
     let live = Live::new(config).expect("sockets");
     live.start().expect("threads");
     let (over, address) = (Arc::new(AtomicBool::new(false)), live.address().to_owned());

@@ -34,9 +34,9 @@ from rthstrack.plots.style import (
     _axes,
     _legend,
     _several,
-    _shared_label,
     _style,
-    _value_range,
+    shared_label,
+    value_range,
 )
 from rthstrack.verdict import display
 from rthstrack.verdict.assessment import Assessment
@@ -183,7 +183,7 @@ def plot_frequency_response(
             axis.semilogx(frequency, values, color=DOUBTFUL)
             axis.semilogx(frequency, np.where(sure, values, np.nan), color=VALUE, linewidth=1)
             relied_on = values[sure & in_view]
-            _value_range(axis, relied_on if relied_on.size else values[in_view], ideal, least)
+            value_range(axis, relied_on if relied_on.size else values[in_view], ideal, least)
         for coherence_axis in ax[2:]:
             coherence_axis.semilogx(frequency, coherence, color=DOUBTFUL)
             coherence_axis.semilogx(frequency, np.where(sure, coherence, np.nan), color=VALUE, linewidth=1)
@@ -199,7 +199,7 @@ def plot_frequency_response(
             _frequency_axis(axis, low, high)
             if isinstance(result, Assessment):
                 _mark_equivalent_frequency(axis, result, labelled=axis is gain_axis)
-        _shared_label(ax, "Frequency (Hz)")
+        shared_label(ax, "Frequency (Hz)")
     return ax
 
 
@@ -243,7 +243,7 @@ def plot_moving(
                 axis.fill_between(time_s, ends[:, 0], ends[:, 1], color=VALUE, alpha=BAND, linewidth=0)
                 axis.plot(time_s, values, color=VALUE, linewidth=1, label="trusted")
                 shown.append(values)
-            _value_range(axis, np.concatenate(shown), ideal, least)
+            value_range(axis, np.concatenate(shown), ideal, least)
         if assessment is not None and trusted is not None and trusted is not moving:
             _legend(amplitude_axis, columns=2)
         if assessment is not None:
@@ -259,7 +259,7 @@ def plot_moving(
                 axis.set_xlim(assessment.start_s, assessment.start_s + assessment.target.size / assessment.rate_hz)
             elif time_s.size > 1:
                 axis.set_xlim(time_s[0], time_s[-1])
-        _shared_label(ax, "Time (s)")
+        shared_label(ax, "Time (s)")
     return ax
 
 
@@ -282,7 +282,7 @@ def plot_indices(
         indicator_axis.set_ylabel(_label("TI", f"{assessment.unit}²" if assessment.unit else None))
         for axis in ax:
             _time_axis(axis, time_s)
-        _shared_label(ax, "Time (s)")
+        shared_label(ax, "Time (s)")
     return ax
 
 

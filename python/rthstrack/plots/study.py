@@ -30,9 +30,9 @@ from rthstrack.plots.style import (
     VALUE,
     _axes,
     _several,
-    _shared_label,
     _style,
-    _value_range,
+    shared_label,
+    value_range,
 )
 
 if TYPE_CHECKING:
@@ -277,12 +277,12 @@ def _plot_tracking(
             if finite.size:
                 middle = float(np.median(finite))
                 least = max(_LEAST_SHARE * abs(middle), _LEAST_MS if factor != 1 else 0.0)
-                _value_range(axis, finite, middle, least)
+                value_range(axis, finite, middle, least)
             axis.yaxis.set_major_formatter(matplotlib.ticker.ScalarFormatter(useOffset=False))
             _few_y_ticks(axis)
             axis.set_ylabel(name)
             _power_axis(axis, curves, label)
-        _shared_label(ax, label)
+        shared_label(ax, label)
         _curve_legend(ax[0])
     return ax
 

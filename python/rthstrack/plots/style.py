@@ -104,7 +104,7 @@ def _legend(ax: Axes, columns: int = 1) -> None:
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, columnspacing=1.2)
 
 
-def _value_range(ax: Axes, values: NDArray[np.float64], ideal: float, least: float) -> None:
+def value_range(ax: Axes, values: NDArray[np.float64], ideal: float, least: float) -> None:
     """The range of the values, not narrower than `least`, with the ideal in it unless that flattens the curve."""
     finite = values[np.isfinite(values)]
     if not finite.size:
@@ -118,7 +118,7 @@ def _value_range(ax: Axes, values: NDArray[np.float64], ideal: float, least: flo
     ax.set_ylim(low - air, high + air)
 
 
-def _shared_label(ax: Sequence[Axes] | NDArray[Any], label: str) -> None:
+def shared_label(ax: Sequence[Axes] | NDArray[Any], label: str) -> None:
     """Stacked axes say their common horizontal axis once, at the bottom."""
     for axis in ax[:-1]:
         axis.set_xlabel("")

@@ -11,7 +11,7 @@ import numpy as np
 
 from rthstrack.errors import RecordingError
 from rthstrack.recording.readers.stamps import Irregular, Uniform, examine
-from rthstrack.recording.recording import _select
+from rthstrack.recording.recording import select
 from rthstrack.said import Said
 from rthstrack.units import seconds_in, split_unit
 
@@ -27,7 +27,7 @@ _AGREEMENT = 0.01
 
 
 @dataclass(frozen=True, slots=True)
-class _Rate:
+class Rate:
     hz: float | None
     source: str
     start_s: float = 0.0
@@ -35,7 +35,7 @@ class _Rate:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _TimeColumn:
+class TimeColumn:
     """A column that may tell the time: `what` names it in messages; `exact` unless it is a computer's clock."""
 
     what: str
@@ -55,11 +55,11 @@ _TIME_NAMES = re.compile(
 )
 
 
-def _time_columns(contents: Contents, chosen: str | None, file: str) -> list[_TimeColumn]:
+def time_columns(contents: Contents, chosen: str | None, file: str) -> list[TimeColumn]:
     """The columns that may tell the time, best first; only the chosen one where one is."""
     series, clocks = contents.series, contents.clocks
     if chosen is not None:
-        at = _select(chosen, [(c.name, c.path) for c in series] + [(c.name, c.path) for c in clocks], file)
+        at = select(chosen, [(c.name, c.path) for c in series] + [(c.name, c.path) for c in clocks], file)
         if at < len(series):
             return [_numeric_time(series[at], seconds_in(_unit(series[at])) or 1.0, "--time")]
         return [_clock_time(clocks[at - len(series)])]
@@ -90,16 +90,16 @@ def _unit(series: Series) -> str | None:
     return series.unit or split_unit(series.name)[1]
 
 
-def _numeric_time(series: Series, unit_s: float, how: str = "") -> _TimeColumn:
+def _numeric_time(series: Series, unit_s: float, how: str = "") -> TimeColumn:
     what = f"time column '{series.path}'" + (f" ({how})" if how else "")
-    return _TimeColumn(what, series.path, series.values, unit_s)
+    return TimeColumn(what, series.path, series.values, unit_s)
 
 
-def _clock_time(clock: Clock) -> _TimeColumn:
-    return _TimeColumn(f"date-time column '{clock.path}'", clock.path, clock.seconds, 1.0, is_clock=True)
+def _clock_time(clock: Clock) -> TimeColumn:
+    return TimeColumn(f"date-time column '{clock.path}'", clock.path, clock.seconds, 1.0, is_clock=True)
 
 
-def _settle(contents: Contents, columns: Sequence[_TimeColumn], *, chosen: bool, file: str) -> _Rate:
+def settle(contents: Contents, columns: Sequence[TimeColumn], *, chosen: bool, file: str) -> Rate:
     """The rate by the order of `read_recording`, every contradiction an error."""
     if chosen:
         verdict = columns[0].examine()
@@ -107,7 +107,7 @@ def _settle(contents: Contents, columns: Sequence[_TimeColumn], *, chosen: bool,
             raise RecordingError(f"{columns[0].what} {verdict.problem}", file=file, advice=_hint(verdict))
         ignored = [s for s in contents.statements if not _agree(verdict, s.rate_hz)]
         said = tuple(_not_followed(s.source, s.rate_hz, "named time") for s in ignored)
-        return _Rate(verdict.rate_hz, columns[0].what, verdict.start_s, said)
+        return Rate(verdict.rate_hz, columns[0].what, verdict.start_s, said)
     stated = _stated(contents, file)
     numeric = [column for column in columns if not column.is_clock]
     clocks = [column for column in columns if column.is_clock]
@@ -125,15 +125,15 @@ def _settle(contents: Contents, columns: Sequence[_TimeColumn], *, chosen: bool,
         if rate is None:
             if isinstance(verdict, Irregular):
                 raise RecordingError(f"{clock.what} {verdict.problem}", file=file, advice=_hint(verdict))
-            rate = _Rate(verdict.rate_hz, clock.what)
+            rate = Rate(verdict.rate_hz, clock.what)
         elif rate.hz is not None:
             notes += _compare_clock(rate, clock, verdict, file)
     if rate is not None:
         return replace(rate, notes=(*rate.notes, *notes))
-    return _guessed(contents) or _Rate(None, "the file states no sampling rate and has no time column")
+    return _guessed(contents) or Rate(None, "the file states no sampling rate and has no time column")
 
 
-def _stated(contents: Contents, file: str) -> _Rate | None:
+def _stated(contents: Contents, file: str) -> Rate | None:
     """What the file's header, attributes or single numbers say."""
     whole = [s for s in contents.statements if s.channel is None]
     single = [s for s in contents.statements if s.channel is not None]
@@ -145,20 +145,20 @@ def _stated(contents: Contents, file: str) -> _Rate | None:
                 advice="give {rate_hz}",
             )
     if whole:
-        return _Rate(whole[0].rate_hz, whole[0].source)
+        return Rate(whole[0].rate_hz, whole[0].source)
     if not single:
         return None
     slow, fast = (pick(single, key=lambda s: s.rate_hz) for pick in (min, max))
     if fast.rate_hz - slow.rate_hz > 1e-6 * fast.rate_hz:
-        return _Rate(
+        return Rate(
             None,
             f"the channels have different sampling rates ({slow.source}: {slow.rate_hz:g} Hz for '{slow.channel}', "
             f"{fast.rate_hz:g} Hz for '{fast.channel}')",
         )
-    return _Rate(single[0].rate_hz, single[0].source)
+    return Rate(single[0].rate_hz, single[0].source)
 
 
-def _told(columns: Sequence[_TimeColumn], stated: _Rate | None, file: str) -> _Rate | None:
+def _told(columns: Sequence[TimeColumn], stated: Rate | None, file: str) -> Rate | None:
     """What the numeric time columns say; irregular ones are an error unless another one is uniform."""
     verdicts = [(column, column.examine()) for column in columns]
     uniform = [(c, v) for c, v in verdicts if isinstance(v, Uniform)]
@@ -180,7 +180,7 @@ def _told(columns: Sequence[_TimeColumn], stated: _Rate | None, file: str) -> _R
                 )
     for other, verdict in uniform[1:]:
         if not _agree(verdict, first.rate_hz):
-            return _Rate(
+            return Rate(
                 None,
                 f"{column.what} says {first.rate_hz:g} Hz, but {other.what} {verdict.rate_hz:g} Hz",
             )
@@ -191,10 +191,10 @@ def _told(columns: Sequence[_TimeColumn], stated: _Rate | None, file: str) -> _R
             "give the rate if you know better"
         )
         notes.append(Said(words, "rounded_time", (first.low_hz, first.high_hz)))
-    return _Rate(first.rate_hz, column.what, first.start_s, tuple(notes))
+    return Rate(first.rate_hz, column.what, first.start_s, tuple(notes))
 
 
-def _compare_clock(rate: _Rate, clock: _TimeColumn, verdict: Uniform | Irregular, file: str) -> list[str]:
+def _compare_clock(rate: Rate, clock: TimeColumn, verdict: Uniform | Irregular, file: str) -> list[str]:
     """A computer's clock beside a better source: it may jitter (a note), but not run at another rate."""
     assert rate.hz is not None
     if isinstance(verdict, Uniform) and _agree(verdict, rate.hz):
@@ -210,7 +210,7 @@ def _compare_clock(rate: _Rate, clock: _TimeColumn, verdict: Uniform | Irregular
     )
 
 
-def _guessed(contents: Contents) -> _Rate | None:
+def _guessed(contents: Contents) -> Rate | None:
     """The first column where columns have no names, if it rises evenly in steps that are no count."""
     first = contents.series[0]
     if not contents.nameless or len(contents.series) < 2 or len(first.values) < 4:
@@ -219,10 +219,10 @@ def _guessed(contents: Contents) -> _Rate | None:
     if isinstance(verdict, Irregular) or abs(verdict.rate_hz - 1) < 1e-6:
         return None
     source = f"column '{first.path}' (it has no name, but rises evenly: taken as time in s)"
-    return _Rate(verdict.rate_hz, source, verdict.start_s)
+    return Rate(verdict.rate_hz, source, verdict.start_s)
 
 
-def _doubts(contents: Contents, columns: Sequence[_TimeColumn], rate_hz: float) -> list[str]:
+def doubts(contents: Contents, columns: Sequence[TimeColumn], rate_hz: float) -> list[str]:
     """What in the file contradicts a rate that the user gave."""
     said: list[str] = [
         _not_followed(s.source, s.rate_hz, "given rate")

@@ -7,10 +7,10 @@ import os
 from typing import TYPE_CHECKING
 
 from rthstrack.errors import SettingError
-from rthstrack.recording.rate import _doubts, _Rate, _settle, _time_columns
+from rthstrack.recording.rate import Rate, doubts, settle, time_columns
 from rthstrack.recording.readers import read_contents
-from rthstrack.recording.recording import Recording, _channels
-from rthstrack.recording.resampling import _resampled
+from rthstrack.recording.recording import Recording, channels_of
+from rthstrack.recording.resampling import resample
 
 if TYPE_CHECKING:
     from rthstrack.recording.readers.contents import Contents
@@ -51,14 +51,14 @@ def recording_from(
     resample_hz: float | None = None,
 ) -> Recording:
     """Settles the sampling rate of a file's contents, as `read_recording` describes."""
-    columns = _time_columns(contents, time, file)
+    columns = time_columns(contents, time, file)
     if resample_hz is not None:
-        return _resampled(contents, file, columns, resample_hz)
+        return resample(contents, file, columns, resample_hz)
     if rate_hz is not None:
-        rate = _Rate(float(rate_hz), "--rate", 0.0, tuple(_doubts(contents, columns, rate_hz)))
+        rate = Rate(float(rate_hz), "--rate", 0.0, tuple(doubts(contents, columns, rate_hz)))
     else:
-        rate = _settle(contents, columns, chosen=time is not None, file=file)
-    channels = _channels(contents, contents.series)
+        rate = settle(contents, columns, chosen=time is not None, file=file)
+    channels = channels_of(contents, contents.series)
     return Recording(
         file, contents.format, channels, rate.hz, rate.source, rate.start_s, (*contents.notes, *rate.notes)
     )

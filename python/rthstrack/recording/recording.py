@@ -60,7 +60,7 @@ class Recording:
         By exact name or path, else by either without regard to case and blanks, else `#0`, `#1`, ... in the order of
         `channels` (as `rthstrack channels` lists them). Raises ChannelError if there is none or more than one.
         """
-        return self.channels[_select(selector, [(c.name, c.path) for c in self.channels], self.file)]
+        return self.channels[select(selector, [(c.name, c.path) for c in self.channels], self.file)]
 
     def scaled(self, factors: Mapping[str, float]) -> Recording:
         """The recording with some channels multiplied: {selector: factor}.
@@ -137,7 +137,7 @@ class Recording:
         return replace(self, channels=tuple(channels), notes=tuple(notes), n_filled=MappingProxyType(n_filled))
 
 
-def _channels(contents: Contents, series: Sequence[Series]) -> tuple[Channel, ...]:
+def channels_of(contents: Contents, series: Sequence[Series]) -> tuple[Channel, ...]:
     # Units are read from all names together: what x_m means depends on whether there is an x_t.
     all_names = [s.name for s in contents.series]
     by_name = dict(zip(all_names, units_from_names(all_names), strict=True))
@@ -168,7 +168,7 @@ def _filled(values: NDArray[np.float64], longest: int) -> tuple[NDArray[np.float
     return _frozen(out), int(np.count_nonzero(gaps)), int(np.count_nonzero(inner))
 
 
-def _select(selector: str, channels: Sequence[tuple[str, str]], file: str) -> int:
+def select(selector: str, channels: Sequence[tuple[str, str]], file: str) -> int:
     """The index of the one channel, given as (name, path), that a selector names."""
 
     def loose(text: str) -> str:

@@ -10,17 +10,17 @@ import numpy as np
 
 from rthstrack.errors import RecordingError, SettingError
 from rthstrack.recording.readers.stamps import Irregular
-from rthstrack.recording.recording import Recording, _channels
+from rthstrack.recording.recording import Recording, channels_of
 from rthstrack.said import Said
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rthstrack.recording.rate import _TimeColumn
+    from rthstrack.recording.rate import TimeColumn
     from rthstrack.recording.readers.contents import Contents
 
 
-def _resampled(contents: Contents, file: str, columns: Sequence[_TimeColumn], hz: float) -> Recording:
+def resample(contents: Contents, file: str, columns: Sequence[TimeColumn], hz: float) -> Recording:
     """Every channel on a uniform grid from the first stamp on, by a cubic spline through the samples."""
     from scipy.interpolate import CubicSpline
 
@@ -80,4 +80,4 @@ def _resampled(contents: Contents, file: str, columns: Sequence[_TimeColumn], hz
         notes.append(Said(words, "not_resampled", [len(left_out)]))
     start = float(column.stamps[0]) * column.unit_s
     source = f"--resample, from {column.what}"
-    return Recording(file, contents.format, _channels(contents, series), float(hz), source, start, tuple(notes))
+    return Recording(file, contents.format, channels_of(contents, series), float(hz), source, start, tuple(notes))

@@ -27,7 +27,7 @@ DRAWN_SAMPLES = 200_000
 DRAWN_POINTS = 6_000
 
 
-class _Blocks:
+class Blocks:
     """The columns of samples on the page, each once: a channel shared by several assessments is stored once."""
 
     def __init__(self) -> None:
@@ -76,7 +76,7 @@ def _take(values: NDArray[Any], kept: NDArray[np.intp] | None) -> NDArray[Any]:
     return values if kept is None else values[kept]
 
 
-def _drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any]:
+def _drawing(a: Assessment, blocks: Blocks) -> dict[str, Any]:
     drawing = {
         "unit": a.unit or "",
         "amplitude": a.tracking.amplitude,
@@ -97,7 +97,7 @@ def _drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any]:
     return plain
 
 
-def _time_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any]:
+def _time_drawing(a: Assessment, blocks: Blocks) -> dict[str, Any]:
     target_role, measured_role = display.signal_roles(a.part)
     target_label, measured_label = _signal(target_role, a.target_name), _signal(measured_role, a.measured_name)
     kept = _kept_samples(a)
@@ -127,7 +127,7 @@ def _signal(role: str, name: str) -> str:
     return role if name.lower() == role else f"{role}: {name}"
 
 
-def _histories_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any]:
+def _histories_drawing(a: Assessment, blocks: Blocks) -> dict[str, Any]:
     h = a.histories
     columns = {
         "max_tracking_error": h.max_tracking_error,
@@ -150,7 +150,7 @@ def _histories_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any]:
     }
 
 
-def _moving_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any] | None:
+def _moving_drawing(a: Assessment, blocks: Blocks) -> dict[str, Any] | None:
     m = a.moving
     if m is None or m.time_s.size == 0:
         return None
@@ -187,7 +187,7 @@ def _trusted_columns(m: MovingTracking) -> dict[str, NDArray[np.float64]]:
     }
 
 
-def _spectrum_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any] | None:
+def _spectrum_drawing(a: Assessment, blocks: Blocks) -> dict[str, Any] | None:
     t = a.tracking
     if t.frequency_hz is None or t.weights is None or t.target_spectrum is None or t.measured_spectrum is None:
         return None
@@ -206,7 +206,7 @@ def _spectrum_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any] | None:
     }
 
 
-def _response_drawing(a: Assessment, blocks: _Blocks) -> dict[str, Any] | None:
+def _response_drawing(a: Assessment, blocks: Blocks) -> dict[str, Any] | None:
     r = a.response
     if r is None:
         return None

@@ -19,9 +19,9 @@ import numpy as np
 from rthstrack._core import __version__
 from rthstrack.assets import asset, digest
 from rthstrack.errors import SettingError
-from rthstrack.report.drawing import _Blocks, _drawing, _signal
+from rthstrack.report.drawing import Blocks, _drawing, _signal
 from rthstrack.report.record import NOT_DETERMINED, _reasons, _why, result_record
-from rthstrack.report.written import _flat, _interval, _number, _setting
+from rthstrack.report.written import _interval, _number, _setting, flat
 from rthstrack.verdict import display
 from rthstrack.verdict.sentence import reason
 
@@ -50,7 +50,7 @@ def report_html(assessments: Sequence[Assessment]) -> str:
     """The text of the page that `write_report` writes."""
     if not assessments:
         raise SettingError("a report needs at least one assessment, none was given; evaluate a recording first")
-    blocks = _Blocks()
+    blocks = Blocks()
     drawing = [_drawing(assessment, blocks) for assessment in assessments]
     version, created = __version__, datetime.now().astimezone()
     results = {
@@ -447,7 +447,7 @@ def _settings_table(a: Assessment, version: str, created: datetime) -> str:
         ("duration", "Duration", f"{a.target.size / a.rate_hz:.6g} s"),
         ("unit", "Unit", a.unit or "not stated"),
     ]
-    rows += [(name, *_setting(name, value)) for name, value in _flat(settings)]
+    rows += [(name, *_setting(name, value)) for name, value in flat(settings)]
     trusted = a.trusted.settings
     nearest = ""
     if trusted.expected_delay_s is not None:

@@ -53,12 +53,12 @@ def _interval(field: str, interval: Iterable[float], value: float, unit: str = "
     return f'95 %: <span data-field="{field}" {ends}>{shown}</span>'
 
 
-def _flat(settings: Mapping[str, Any], before: str = "") -> list[tuple[str, Any]]:
+def flat(settings: Mapping[str, Any], before: str = "") -> list[tuple[str, Any]]:
     rows: list[tuple[str, Any]] = []
     for key, value in settings.items():
         name = f"{before}{key}"
         if isinstance(value, Mapping):
-            rows += _flat(value, f"{name} · ") if value else [(name, None)]
+            rows += flat(value, f"{name} · ") if value else [(name, None)]
         else:
             rows.append((name, value))
     return rows

@@ -20,7 +20,7 @@ from rthstrack.evaluation.inputs import merged
 from rthstrack.evaluation.tracking import Evaluator, Tracking
 from rthstrack.said import Said, failed, of_core
 from rthstrack.studies.cells import Cell, StudiedSource, Study, _key
-from rthstrack.studies.pairs import _pairs
+from rthstrack.studies.pairs import pairs_of
 from rthstrack.studies.settings import StudySettings
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def study(
     A cell that leaves nothing to judge by is NaN, with a reason. Raises SettingError, SignalError, RecordingError.
     """
     settings = merged(StudySettings, settings, changes).checked()
-    pairs = _pairs(sources, truth)
+    pairs = pairs_of(sources, truth)
     grid, kinds = settings._grid(), settings._kinds()
     extras = [("chosen", math.nan)] * bool(settings.choose) + [("key", share) for share in settings.shares]
     # The changes need P = Q = 1 where the grid lacks it. Pairs of one length share a plan: they follow each other.

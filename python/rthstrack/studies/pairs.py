@@ -108,7 +108,7 @@ def read_pairs(
     return found
 
 
-def _pairs(sources: Source | Sequence[Source] | Mapping[str, Source], truth: Truth | None) -> list[Pair]:
+def pairs_of(sources: Source | Sequence[Source] | Mapping[str, Source], truth: Truth | None) -> list[Pair]:
     """Every source as pairs, each with a name of its own."""
     if isinstance(sources, Mapping):
         listed = list(sources.items())

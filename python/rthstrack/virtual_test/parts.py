@@ -357,7 +357,7 @@ class VirtualTest:
             if not (key.endswith("dof") and key.rpartition(".")[0] in told) and key not in {m.key for m in mistakes}:
                 mistakes.append(Mistake(key, message))
         for i, actuator in enumerate(self.actuators, 1):
-            for name in _CONVERTERS:
+            for name in CONVERTERS:
                 density, key = getattr(actuator, name).noise_density, f"actuator[{i}].{name}.noise_density"
                 if not 0 <= density <= 1e30:
                     mistakes.append(Mistake(key, f"expected a number from 0 to 1e30, found {density}"))
@@ -416,7 +416,7 @@ class VirtualTest:
 #: What an actuator says of its place in the structure.
 OF_STRUCTURE = ("dof", "from_dof", "part_of_structure", "force_delay_samples")
 _DEFAULTS = {one.name: one.default for one in fields(Actuator)}
-_CONVERTERS = ("command_converter", "displacement_sensor", "force_sensor")
+CONVERTERS = ("command_converter", "displacement_sensor", "force_sensor")
 
 
 def _matrix(values: ArrayLike) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from rthstrack._core import VirtualTest as CoreVirtualTest
 from rthstrack.errors import ConfigurationError, SettingError, UnstableError
-from rthstrack.virtual_test.parts import _CONVERTERS, DelayHistory
+from rthstrack.virtual_test.parts import CONVERTERS, DelayHistory
 from rthstrack.virtual_test.run import CriticalDelay, Run
 
 if TYPE_CHECKING:
@@ -185,7 +185,7 @@ def _noise(test: VirtualTest, n_samples: int) -> list[list[float] | None]:
     streams = np.random.SeedSequence(test.seed).spawn(3 * len(test.actuators))
     noise: list[list[float] | None] = []
     for actuator in test.actuators:
-        for name in _CONVERTERS:
+        for name in CONVERTERS:
             density = getattr(actuator, name).noise_density
             stream = np.random.Generator(np.random.PCG64(streams[len(noise)]))
             std = math.sqrt(density * test.rate_hz)
