@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from rthstrack._core import alarm_settings
+from rthstrack._core import settings_table
 
 HEALTH = {
     "received": 0, "lost": 0, "repeated": 0, "reordered": 0, "malformed": 0, "refused": 0, "filled": 0, "restarts": 0,
@@ -24,7 +24,7 @@ MONITOR = {
     "frequency_decimation", "max_delay_s", "expected_delay_s", "minimum_amplitude", "n_actuators",
 }  # fmt: skip
 SOURCE = {"kind", "address", "senders", "layout", "fill_samples", "check_pace", "path"}
-ALARMS = {setting["name"] for setting in alarm_settings() if setting["option"]}
+ALARMS = {setting["name"] for setting in settings_table("alarms") if setting["name"] != "unjudged_s"}
 OUTPUTS = {"readings_udp", "readings_file", "alarm_udp", "control", "log", "page", "names", "units"}
 
 

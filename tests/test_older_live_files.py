@@ -71,9 +71,9 @@ def test_a_log_of_readings_says_what_the_lines_say() -> None:
 
 
 def test_alarms_have_names_that_are_still_known() -> None:
-    from rthstrack._core import alarm_settings
+    from rthstrack._core import settings_table
 
-    known = {setting["name"].removeprefix("limit_").removesuffix("_s") for setting in alarm_settings()}
+    known = {setting["name"].removeprefix("limit_").removesuffix("_s") for setting in settings_table("alarms")}
     alarms = [line["alarm"] for line in lines("alarms.jsonl")]
     assert [(one["name"], one["actuator"], one["raised"]) for one in alarms] == [
         ("delay", 0, True),

@@ -16,7 +16,6 @@ __all__ = [
     "Monitor",
     "VirtualTest",
     "__version__",
-    "alarm_settings",
     "bridged",
     "causal_decimate",
     "check_test",
@@ -193,7 +192,6 @@ class Live:
     def take_readings(self) -> dict[str, Any]: ...
     def note_log(self, state: str | None, why: str | None = None) -> None: ...
 
-def alarm_settings() -> list[dict[str, Any]]: ...
 def choose_factors(
     evaluator: Evaluator,
     target: NDArray[Any],

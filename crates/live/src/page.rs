@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex};
 
 use rthstrack::Monitor;
+use rthstrack::setting::{Configuration, Value};
 
 use crate::alarm::{AlarmConfig, Kind};
 use crate::board::Board;
@@ -204,11 +205,16 @@ fn hello(monitor: &Monitor, limits: &AlarmConfig, source: &str, outputs: &Output
     text(out, source);
     key(out, "limits");
     out.push('{');
-    for setting in AlarmConfig::SETTINGS.iter().filter(|setting| setting.is_limit) {
+    for setting in AlarmConfig::TABLE.iter().filter(|setting| !AlarmConfig::RULES.contains(&setting.name)) {
         // A share of what is not given is no limit.
         let is_idle = setting.name == "critical_fraction" && limits.critical_delay_s.is_none();
         key(out, limit_name(setting.name));
-        optional(out, limits.get(setting.name).filter(|_| !is_idle));
+        let value = match (setting.get)(limits) {
+            Value::Number(value) => Some(value),
+            Value::Whole(value) => Some(value as f64),
+            _ => None,
+        };
+        optional(out, value.filter(|_| !is_idle));
     }
     key(out, "latch");
     boolean(out, limits.latch);

@@ -3,10 +3,11 @@
 use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
 use std::path::PathBuf;
 
+use rthstrack::setting::{self, Configuration};
 use rthstrack::{Error, Monitor, MonitorConfig};
 use serde_json::{Map, Value};
 
-use crate::alarm::{AlarmConfig, Kind, Range, Setting, Source};
+use crate::alarm::{AlarmConfig, Kind, Source};
 use crate::layout::{ByteOrder, Field, LayoutConfig, Number};
 use crate::line::{Column, Format, LinesConfig};
 
@@ -237,17 +238,14 @@ const UNJUDGED_S: f64 = 2.0;
 fn read_alarms(keys: &mut Keys<'_>, window_s: f64) -> AlarmConfig {
     let mut config = AlarmConfig::default();
     let is_unjudged_given = keys.map.contains_key("unjudged_s");
-    for Setting { name, range, .. } in AlarmConfig::SETTINGS {
+    for setting in AlarmConfig::TABLE {
         // Without a limit is not the same as the default.
-        if !keys.map.contains_key(*name) {
+        let Some(given) = keys.map.remove(setting.name).filter(|given| setting.optional || !given.is_null()) else {
             continue;
-        }
-        let value = match range {
-            Range::Count => keys.whole(name).map(|n| n as f64),
-            Range::Flag => keys.flag(name).map(|flag| f64::from(u8::from(flag))),
-            _ => keys.number(name),
         };
-        config.put(name, value);
+        if let Err(error) = setting.read(&mut config, &plain(&given)) {
+            keys.mistakes.push(format!("{}: {error}", keys.whose));
+        }
     }
     // Who has set a limit is told when nothing watches it.
     let mut of_readings =
@@ -257,6 +255,21 @@ fn read_alarms(keys: &mut Keys<'_>, window_s: f64) -> AlarmConfig {
         config.unjudged_s = Some(window_s + UNJUDGED_S);
     }
     config
+}
+
+/// A value of JSON as the table of settings takes it.
+fn plain(value: &Value) -> setting::Value {
+    match value {
+        Value::Null => setting::Value::Nothing,
+        Value::Bool(flag) => setting::Value::Flag(*flag),
+        Value::String(text) => setting::Value::Text(text.clone()),
+        Value::Number(number) => match (number.as_i64(), number.as_f64()) {
+            (Some(whole), _) => setting::Value::Whole(whole),
+            (None, Some(number)) => setting::Value::Number(number),
+            (None, None) => setting::Value::Other(number.to_string()),
+        },
+        other => setting::Value::Other(other.to_string()),
+    }
 }
 
 fn read_outputs(keys: &mut Keys<'_>) -> OutputsConfig {
@@ -420,7 +433,6 @@ fn column(value: &Value) -> Option<Column> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rthstrack::setting;
     use serde_json::json;
 
     fn read(n_actuators: usize, source: Value, alarms: Value, outputs: Value) -> Result<LiveConfig, Vec<String>> {
@@ -483,8 +495,8 @@ mod tests {
             "layout.target[0].type must be one of f32",
             "layout.target[0].offset",
             "layout.measured[0]: unknown key 'size'",
-            "alarms.latch must be true or false",
-            "hysteresis must be",
+            "alarms: latch must be true or false",
+            "alarms: hysteresis must be a share from 0 to below 1",
             "outputs.log must be true or false",
         ] {
             assert!(mistakes.iter().any(|m| m.contains(part)), "{part}: {mistakes:#?}");

@@ -7,7 +7,6 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
 use rthstrack::MonitorConfig;
-use rthstrack_live::alarm::{AlarmConfig, Setting};
 use rthstrack_live::event::LogState;
 use rthstrack_live::{LiveConfig, LiveError, LoggedReading};
 use serde_json::{Map, Number, Value};
@@ -183,25 +182,6 @@ impl Live {
     }
 }
 
-/// The settings of alarms in their order, a dict each.
-#[pyfunction]
-fn alarm_settings(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
-    let usual = AlarmConfig::default();
-    let row = |setting: &Setting| {
-        let dict = PyDict::new(py);
-        dict.set_item("name", setting.name)?;
-        dict.set_item("range", setting.range.name())?;
-        dict.set_item("unit", setting.unit)?;
-        dict.set_item("default", usual.get(setting.name))?;
-        dict.set_item("is_limit", setting.is_limit)?;
-        dict.set_item("option", setting.option)?;
-        dict.set_item("help", setting.help)?;
-        Ok(dict)
-    };
-    AlarmConfig::SETTINGS.iter().map(row).collect()
-}
-
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(alarm_settings, module)?)?;
     module.add_class::<Live>()
 }

@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyList, PyMapping, PyString, PyTuple};
 use rthstrack::setting::{Configuration, Kind, Row, Value, concerns, read};
 use rthstrack::{Error, EvaluatorConfig, MonitorConfig, MovingConfig};
+use rthstrack_live::alarm::AlarmConfig;
 
 use crate::error::to_py;
 
@@ -95,14 +96,15 @@ fn rows(py: Python<'_>, of: &str) -> PyResult<Vec<Row>> {
         "evaluation" => Ok(EvaluatorConfig::rows()),
         "moving" => Ok(MovingConfig::rows()),
         "monitor" => Ok(MonitorConfig::rows()),
+        "alarms" => Ok(AlarmConfig::rows()),
         _ => Err(to_py(
             py,
-            &Error::UnknownSetting { name: of.to_owned(), known: "evaluation, moving, monitor".to_owned() },
+            &Error::UnknownSetting { name: of.to_owned(), known: "evaluation, moving, monitor, alarms".to_owned() },
         )),
     }
 }
 
-/// The table of settings of "evaluation", "moving" or "monitor", a dict each.
+/// The table of settings of "evaluation", "moving", "monitor" or "alarms", a dict each.
 #[pyfunction]
 pub(crate) fn settings_table<'py>(py: Python<'py>, of: &str) -> PyResult<Bound<'py, PyList>> {
     let all = PyList::empty(py);
@@ -137,7 +139,7 @@ pub(crate) fn settings_table<'py>(py: Python<'py>, of: &str) -> PyResult<Bound<'
     Ok(all)
 }
 
-/// The settings of "evaluation", "moving" or "monitor" that are given by name, checked each by itself, of plain types.
+/// The settings of "evaluation", "moving", "monitor" or "alarms" that are given by name, checked each by itself, of plain types.
 #[pyfunction]
 pub(crate) fn checked_settings<'py>(
     py: Python<'py>,
@@ -148,6 +150,7 @@ pub(crate) fn checked_settings<'py>(
         "evaluation" => checked::<EvaluatorConfig>(given),
         "moving" => checked::<MovingConfig>(given),
         "monitor" => checked::<MonitorConfig>(given),
+        "alarms" => checked::<AlarmConfig>(given),
         _ => rows(py, of).map(|_| PyDict::new(py)),
     }
 }

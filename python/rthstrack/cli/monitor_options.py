@@ -9,10 +9,10 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rthstrack._core import alarm_settings, settings_table
+from rthstrack._core import settings_table
 from rthstrack.cli import addresses
-from rthstrack.cli.arguments import count, expected_delay_mistake, not_negative, number, positive
-from rthstrack.cli.setting_options import setting_options
+from rthstrack.cli.arguments import count, expected_delay_mistake, not_negative, positive
+from rthstrack.cli.setting_options import SettingOption, setting_options
 from rthstrack.errors import ConfigurationError, SettingError, printable
 from rthstrack.evaluation.monitor import largest_decimation
 from rthstrack.evaluation.settings import MonitorSettings
@@ -109,12 +109,11 @@ def _add_evaluation(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> No
 
 def _add_alarms(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> None:
     add = _adder(group, wrong)
-    for setting in _alarm_options():
-        if setting["range"] == "flag":
-            group.add_argument(setting["option"], action="store_true", help=setting["help"])
-        else:
-            metavar = setting["unit"].upper() or ("N" if setting["range"] == "count" else "X")
-            add(setting["option"], _RANGES[setting["range"]], metavar, setting["help"])
+    for option in _alarm_options():
+        add(option.flag, not_negative if option.name == "silence_s" else option.read, option.metavar, option.help)
+    group.add_argument(
+        "--no-latch", action="store_true", help="an alarm that is over is gone; else it waits for a reset"
+    )
     add("--alarm-to", addresses.udp, "udp://HOST:PORT", "send a datagram (JSON) when an alarm is raised or over")
     add("--control", addresses.port, "PORT", "take datagrams 'reset' from this machine at this port (a free one)",
         nargs="?", const=0)  # fmt: skip
@@ -163,25 +162,15 @@ def _whole(text: str) -> int:
     return int(text)
 
 
-def _share(text: str) -> float:
-    if not 0 <= (value := number(text)) < 1:
-        raise argparse.ArgumentTypeError(f"expected a number from 0 to less than 1, found '{text}'")
-    return value
+def _alarm_options() -> list[SettingOption]:
+    """The options of alarms but latching, of which only the end has one; for `unjudged_s` there is none."""
+    own = {"silence_s": "1; counts for --exit-on-alarm only where it is given; 0: watch none"}
+    options = setting_options("alarms", flags={"minimum_duration_s": "--alarm-after"}, defaults=own)
+    return [option for option in options if option.name not in ("unjudged_s", "latch")]
 
 
-_RANGES: dict[str, Callable[[str], Any]] = {
-    "positive": positive, "positive_or_off": not_negative, "not_negative": not_negative, "share": _share,
-    "count": count,
-}  # fmt: skip
-
-
-def _alarm_options() -> list[dict[str, Any]]:
-    """The monitor's settings of alarms for which the command has an option."""
-    return [setting for setting in alarm_settings() if setting["option"]]
-
-
-def _given(args: argparse.Namespace, setting: Mapping[str, Any]) -> Any:
-    return getattr(args, setting["option"].lstrip("-").replace("-", "_"))
+def _given(args: argparse.Namespace, option: SettingOption) -> Any:
+    return getattr(args, option.flag.lstrip("-").replace("-", "_"))
 
 
 # Checks ---------------------------------------------------------------------------------------------------------------
@@ -227,22 +216,16 @@ def checked_plan(args: argparse.Namespace, wrong: Mapping[str, str]) -> Plan:
 
 def limits_given(args: argparse.Namespace) -> bool:
     """Whether the user has set any limit for an alarm."""
-    return any(_given(args, setting) for setting in _alarm_options() if setting["is_limit"])
+    limits = (option for option in _alarm_options() if option.name not in ("hysteresis", "minimum_duration_s"))
+    return any(_given(args, option) for option in limits)
 
 
 def _alarms(args: argparse.Namespace) -> dict[str, Any]:
     """The settings of alarms by their names, each with its default where nothing is given."""
-    found = {}
-    for setting in _alarm_options():
-        given, usual = _given(args, setting), setting["default"]
-        if setting["range"] == "flag":
-            value = bool(usual) != given
-        elif given is None:
-            value = usual
-        else:
-            value = None if setting["range"] == "positive_or_off" and not given else given
-        found[setting["name"]] = value
-    return found
+    found = {row["name"]: row["default"] for row in settings_table("alarms") if row["name"] != "unjudged_s"}
+    given = {option.name: _given(args, option) for option in _alarm_options()}
+    found |= {name: value for name, value in given.items() if value is not None}
+    return found | {"silence_s": found["silence_s"] or None, "latch": not args.no_latch}
 
 
 def _layout(args: argparse.Namespace, mistakes: list[str]) -> Layout:

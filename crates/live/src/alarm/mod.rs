@@ -9,7 +9,7 @@ mod kind;
 
 use rthstrack::Reading;
 
-pub use config::{AlarmConfig, Range, Setting};
+pub use config::AlarmConfig;
 pub use kind::{Kind, Observed, Row, Source};
 
 /// One alarm as it stands.
