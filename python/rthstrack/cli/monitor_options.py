@@ -109,8 +109,10 @@ def _add_evaluation(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> No
 
 def _add_alarms(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> None:
     add = _adder(group, wrong)
+    # 0 watches no silence; a limit of no lost sample at all is refused.
+    own = {"silence_s": not_negative, "limit_lost": count}
     for option in _alarm_options():
-        add(option.flag, not_negative if option.name == "silence_s" else option.read, option.metavar, option.help)
+        add(option.flag, own.get(option.name, option.read), option.metavar, option.help)
     group.add_argument(
         "--no-latch", action="store_true", help="an alarm that is over is gone; else it waits for a reset"
     )
