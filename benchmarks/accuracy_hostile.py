@@ -11,7 +11,6 @@ known exactly, and nothing here knows how the package comes to its numbers.
 from __future__ import annotations
 
 import argparse
-import inspect
 import itertools
 import statistics
 import sys
@@ -140,14 +139,9 @@ class Bench:
         return list(self.pool.map(one, range(count)))
 
 
-@cache
-def _takes_expected(function: Callable[..., Any]) -> bool:
-    return "expected_delay_s" in inspect.signature(function).parameters
-
-
 def with_expected(function: Callable[..., Any], *signals: Any, expected_s: float | None, **settings: Any) -> Any:
-    """Calls it with the delay to expect, where it knows the word."""
-    if expected_s is not None and _takes_expected(function):
+    """Calls it with the delay to expect, where there is one."""
+    if expected_s is not None:
         settings["expected_delay_s"] = expected_s
     return function(*signals, **settings)
 

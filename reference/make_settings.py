@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rthstrack._core import settings_table
 
 if TYPE_CHECKING:
-    from rthstrack._core import SettingRow
+    from rthstrack._core import _SettingRow
 
 _ROOT = Path(__file__).resolve().parent.parent
 SETTINGS = _ROOT / "python/rthstrack/evaluation/settings.py"
@@ -44,7 +44,7 @@ class _Checked:
 '''
 
 
-def _type(row: SettingRow) -> str:
+def _type(row: _SettingRow) -> str:
     return _TYPES.get(row["kind"], "float") + (" | None" if row["optional"] else "")
 
 
@@ -52,12 +52,12 @@ def _literal(value: Any) -> str:
     return f'"{value}"' if isinstance(value, str) else repr(value)
 
 
-def _choices(row: SettingRow) -> str:
+def _choices(row: _SettingRow) -> str:
     *others, last = row["choices"]
     return f"{', '.join(others)} or {last}"
 
 
-def _about(row: SettingRow) -> str:
+def _about(row: _SettingRow) -> str:
     """A line of help with what it may be."""
     help = f"{row['help'].rstrip('.')}: {_choices(row)}." if row["choices"] else row["help"]
     unit = f", {row['unit']}" if row["unit"] else ""
@@ -68,7 +68,7 @@ def _wrapped(text: str, indent: int) -> str:
     return "\n".join(textwrap.wrap(text, 120 - indent, initial_indent=" " * indent, subsequent_indent=" " * indent))
 
 
-def _dataclass(name: str, of: str, what: str, rows: list[SettingRow], base: str = "_Checked") -> str:
+def _dataclass(name: str, of: str, what: str, rows: list[_SettingRow], base: str = "_Checked") -> str:
     head = f"class {name}({base}):" if base else f"class {name}:"
     lines = ["@dataclass(frozen=True, slots=True)", head, f'    """{what}', ""]
     lines += [_wrapped(_about(row), 4) for row in rows]
@@ -82,7 +82,7 @@ def _dataclass(name: str, of: str, what: str, rows: list[SettingRow], base: str 
     return "\n".join(lines)
 
 
-def _keywords(name: str, what: str, rows: list[SettingRow], base: str = "TypedDict", automatic: str = "") -> str:
+def _keywords(name: str, what: str, rows: list[_SettingRow], base: str = "TypedDict", automatic: str = "") -> str:
     lines = [f"class {name}({base}, total=False):", f'    """{what}"""', ""]
     for row in rows:
         may_be = f"{_type(row)} | None" if row["name"] == automatic else _type(row)
@@ -114,7 +114,7 @@ def settings_module() -> str:
     return "\n\n\n".join(parts) + "\n"
 
 
-def _table(rows: list[SettingRow]) -> list[str]:
+def _table(rows: list[_SettingRow]) -> list[str]:
     lines = ["| setting | default | expected | what it does |", "| --- | --- | --- | --- |"]
     for row in rows:
         default = "must be given" if row["required"] else "" if row["default"] is None else f"{row['default']}"
@@ -132,7 +132,7 @@ def document() -> str:
     moving = [row for row in settings_table("moving") if row["name"] not in usual]
     monitor = [row for row in whole_monitor if usual.get(row["name"], ...) != row["default"]]
 
-    def listed(rows: list[SettingRow]) -> str:
+    def listed(rows: list[_SettingRow]) -> str:
         return ", ".join(f"`{row['name']}`" for row in rows)
 
     shared = listed([row for row in whole_monitor if row["name"] in usual])

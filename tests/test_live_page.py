@@ -722,7 +722,7 @@ def address(page: Page) -> tuple[str, int]:
 def ask(page: Page, path: str = "/", method: str = "GET", **headers: str | None) -> http.client.HTTPResponse:
     """One request, with headers of choice; None leaves one out."""
     host, port = address(page)
-    connection = http.client.HTTPConnection(host, port, timeout=10)
+    connection = http.client.HTTPConnection(host, port, timeout=PATIENCE_S)
     names = {name.replace("_", "-"): value for name, value in headers.items()}
     connection.putrequest(method, path, skip_host="Host" in names)
     for name, value in names.items():
@@ -748,8 +748,10 @@ def events(page: Page, last: str | None = None) -> Iterator[Iterator[tuple[str, 
                 yield known["event"], known["id"], known["data"]
                 known = {}
 
-    yield each()
-    answer.close()
+    try:
+        yield each()
+    finally:
+        answer.close()
 
 
 def test_three_browsers_watch_at_once(serve: Callable[..., Page], opened: Callable[..., Opened]) -> None:

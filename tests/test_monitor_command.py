@@ -185,7 +185,7 @@ def test_a_limit_that_can_be_exceeded_is_taken(
     ("refusal", "expected"),
     [
         (OSError("cannot listen at 127.0.0.1:5005: Address already in use"), 1),
-        (SettingError("window_s: longer than memory allows"), 2),
+        (SettingError("the window is longer than memory allows"), 2),
     ],
 )
 def test_what_the_compiled_part_refuses_is_told_in_a_line(

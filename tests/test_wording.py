@@ -29,14 +29,7 @@ WORD = re.compile(r"[^\W\d_]{2}")
 # (module, what is asked): why it stands.
 ALLOWED = {
     ("cli/monitor_options.py", "--log, its readings"): "a key of its own table",
-    # What follows is taken out with the alarms' and events' codes.
-    ("cli/monitor.py", " is over"): "an event has no code yet",
-    ("cli/monitor.py", "advisory"): "an event has no code yet",
-    ("cli/monitor.py", "advisory: no sample for"): "an event has no code yet",
-    ("cli/monitor.py", "log: "): "an event has no code yet",
-    ("live/view.py", "ambiguous, delays of (\\S+) and (\\S+) ms fit"): "the view does not read reason_code yet",
-    ("live/view.py", "not determined: "): "the view does not read reason_code yet",
-    ("live/view.py", "too little motion"): "the view does not read reason_code yet",
+    ("live/view.py", "not determined: "): "a reason is shown without what its colour says already",
     ("recording/readers/matlab.py", "MATLAB object"): "notes of readers have no code yet",
 }
 

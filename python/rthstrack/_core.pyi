@@ -80,7 +80,7 @@ class _Readings(_Columns):
 LIVE_NUMBERS: tuple[str, ...]
 __version__: str
 
-class SettingRow(TypedDict):
+class _SettingRow(TypedDict):
     name: str
     kind: str
     choices: list[str]
@@ -95,7 +95,7 @@ class SettingRow(TypedDict):
     help: str
     default: Any
 
-def settings_table(of: str) -> list[SettingRow]: ...
+def settings_table(of: str) -> list[_SettingRow]: ...
 def checked_settings(of: str, given: object) -> dict[str, Any]: ...
 
 @final

@@ -97,6 +97,12 @@ class SettingError(RthstrackError, ValueError):
     code = "setting"
 
 
+class UnknownSettingError(SettingError, TypeError):
+    """There is no setting of this name."""
+
+    code = "unknown_setting"
+
+
 class ConfigurationError(SettingError):
     """A configuration is wrong: `mistakes` are all (key, message), the text one line each, the file's name first."""
 

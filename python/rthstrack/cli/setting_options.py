@@ -15,7 +15,7 @@ from rthstrack.evaluation.settings import Settings
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
-    from rthstrack._core import SettingRow
+    from rthstrack._core import _SettingRow
 
 #: What the command calls otherwise than the library, but for unit and dashes.
 _NAMES = {"data_decimation": "-P", "frequency_decimation": "-Q"}
@@ -88,7 +88,7 @@ def settle(args: argparse.Namespace) -> None:
     args.settings = merged(Settings, PRESETS.get(args.preset), given)
 
 
-def _metavar(row: SettingRow) -> str | tuple[str, str]:
+def _metavar(row: _SettingRow) -> str | tuple[str, str]:
     if row["kind"] == "band":
         return "LO", "HI"
     if row["kind"] == "choice":
@@ -96,7 +96,7 @@ def _metavar(row: SettingRow) -> str | tuple[str, str]:
     return _METAVARS.get(row["kind"]) or row["unit"].upper() or "X"
 
 
-def _reader(row: SettingRow) -> Callable[[str], Any]:
+def _reader(row: _SettingRow) -> Callable[[str], Any]:
     """From a word of the command line; what does not fit says what is expected."""
 
     def read(text: str) -> Any:
@@ -108,7 +108,7 @@ def _reader(row: SettingRow) -> Callable[[str], Any]:
     return read
 
 
-def _value(row: SettingRow, text: str) -> Any:
+def _value(row: _SettingRow, text: str) -> Any:
     kind = row["kind"]
     if kind == "choice":
         return text if text in row["choices"] else None
@@ -124,7 +124,7 @@ def _value(row: SettingRow, text: str) -> Any:
     return value if abs(value) < float("inf") and lowest.get(kind, True) else None
 
 
-def _help(row: SettingRow, default: str | None) -> str:
+def _help(row: _SettingRow, default: str | None) -> str:
     """The line of the table, with choices and default."""
     text = row["help"].rstrip(".")
     text = text if text[:2] in ("P,", "Q,") or text[:2] == "l " else text[:1].lower() + text[1:]

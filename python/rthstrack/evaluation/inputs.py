@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from rthstrack.errors import SettingError, SignalError
+from rthstrack.errors import SettingError, SignalError, UnknownSettingError
 from rthstrack.evaluation.settings import Settings
 from rthstrack.keyed_table import suggestion
 
@@ -41,7 +41,7 @@ def merged(kind: type[_Kind], settings: DataclassInstance | None, changes: Mappi
     known = [one.name for one in fields(kind)]
     if unknown := [name for name in given if name not in known]:
         near = suggestion(unknown[0], known) or f"; there are: {', '.join(known)}"
-        raise SettingError(f"unknown setting {', '.join(unknown)}{near}")
+        raise UnknownSettingError(f"unknown setting {', '.join(unknown)}{near}")
     return kind(**given)
 
 

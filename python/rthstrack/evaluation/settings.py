@@ -30,7 +30,7 @@ class Settings(_Checked):
     estimator: How gain and delay are estimated: fei, aligned or least_squares.
     data_decimation: P, a power of two: keeps the frequencies up to rate / (2 P); of a monitor up to rate / (4 P).
     frequency_decimation: Q, a power of two: keeps every Q-th frequency bin.
-    decimator: How P is carried out: exactly the bins of the undecimated transform, or filtered as published:
+    decimator: How P is carried out, exactly on the bins of the undecimated transform or filtered as published:
     spectral or chebyshev.
     weight_power: l of Eqs 7 and 12: bins weigh |target|^l.
     window: Window over the record: boxcar, hann, hamming, blackman, flattop or tukey.
@@ -130,7 +130,7 @@ class StudyMethod:
     """What all cells of a study share.
 
     estimator: How gain and delay are estimated: fei, aligned or least_squares.
-    decimator: How P is carried out: exactly the bins of the undecimated transform, or filtered as published:
+    decimator: How P is carried out, exactly on the bins of the undecimated transform or filtered as published:
     spectral or chebyshev.
     detrend: What is subtracted before the window: none, mean or linear.
     band_hz, Hz: Lowest and highest frequency judged, both included.

@@ -44,8 +44,8 @@ def read_chosen(
     file = os.fspath(path)
     recording = read_recording(file, rate_hz=rate_hz, time=time, resample_hz=resample_hz)
     if recording.rate_hz is None:
-        why = f"{file}: no sampling rate: {recording.rate_source}"
-        raise RecordingError(why, advice="give {rate_hz} or {time}")
+        why = f"no sampling rate: {recording.rate_source}"
+        raise RecordingError(why, file=file, advice="give {rate_hz} or {time}")
     pairs, proposal = list(zip(targets, measured, strict=False)), None
     if len(targets) != len(measured):
         raise SettingError(f"one measured for each target is needed, found {len(measured)} for {len(targets)}")

@@ -67,10 +67,10 @@ def read_motion(
     """
     file = str(path)
     if layout not in ("channels", "values"):
-        raise SettingError(f"{file}: layout: expected 'channels' or 'values', found '{layout}'")
+        raise SettingError(f"layout: expected 'channels' or 'values', found '{layout}'", file=file)
     if layout == "values":
         if channel is not None:
-            raise SettingError(f"{file}: channel: a file with the layout 'values' has no channels")
+            raise SettingError("channel: a file with the layout 'values' has no channels", file=file)
         values, notes = _in_reading_order(Path(path))
         rate, own_unit, what = rate_hz, None, "values in reading order"
         unknown = "a list of values states no sampling rate"
