@@ -409,7 +409,8 @@ def noise(run: Run) -> None:
             bias, std, _ = moments(errors)
             run.say(f"### {pair.name}, {100 * share:g} %: limit {1e6 * limits[0, 1]:.3g} us, whole record")
             _noise_table(run, errors, bias, std, limits)
-            if np.nanmax(np.abs(bias[0] / std[0])) > 0.1:
+            # Of few draws nearly every mean lies so far off.
+            if not run.short and np.nanmax(np.abs(bias[0] / std[0])) > 0.1:
                 doubted.append((pair, share, seed))
             for i, part in enumerate((slice(0, 1), slice(1, None))):
                 ours = np.abs(bias[0, part] / std[0, part]), std[0, part] / limits[part]
