@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rthstrack.cli.setting_options import spoken
 from rthstrack.errors import SettingError
 from rthstrack.evaluation.presets import PRESETS
+from rthstrack.units import is_unit
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,6 +25,10 @@ def add_signals(parser: argparse.ArgumentParser, title: str) -> argparse._Argume
     signals.add_argument("--measured", action="append", metavar="M", help="what the sensor says, one for each --target")
     signals.add_argument(
         "--scale", action="append", type=scale, default=[], metavar="CHANNEL=X", help="multiply a channel"
+    )
+    signals.add_argument(
+        "--unit", action="append", type=unit, default=[], metavar="[CHANNEL=]U",
+        help="unit of a channel (time too), or of all that are judged and state none",
     )
     rate = signals.add_mutually_exclusive_group()
     rate.add_argument("--rate", type=positive, metavar="HZ", help="sampling rate, where the file does not say")
@@ -42,9 +47,11 @@ def chosen(args: argparse.Namespace) -> dict[str, Any]:
     return {
         "targets": args.target or (),
         "measured": args.measured or (),
+        "commands": getattr(args, "command", None) or (),
         "rate_hz": args.rate,
         "time": args.time,
         "resample_hz": args.resample,
+        "units": dict(args.unit),
         "scale": dict(args.scale),
         "fill": args.fill,
         "start_s": args.start,
@@ -60,6 +67,7 @@ OPTIONS = {
     "time": "--time CHANNEL",
     "resample_hz": "--resample HZ",
     "fill": "--fill SAMPLES",
+    "unit": "--unit",
 }
 
 
@@ -145,6 +153,13 @@ def scale(text: str) -> tuple[str, float]:
     if (value := number(factor)) == 0:
         raise argparse.ArgumentTypeError(f"expected a factor other than zero, found '{text}'")
     return channel, value
+
+
+def unit(text: str) -> tuple[str, str]:
+    channel, _, found = text.rpartition("=")
+    if not is_unit(found):
+        raise argparse.ArgumentTypeError(f"expected a unit (mm, m, in, V, ms, ...) or CHANNEL=UNIT, found '{text}'")
+    return channel, found
 
 
 def path(*endings: str) -> Callable[[str], Path]:

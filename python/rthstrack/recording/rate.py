@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from rthstrack.errors import RecordingError
 from rthstrack.recording.readers.stamps import Irregular, Uniform, examine
 from rthstrack.recording.recording import select
+from rthstrack.recording.time_units import CountedIn, counted_in, rounded_step
 from rthstrack.said import Said
 from rthstrack.units import seconds_in, split_unit
 
@@ -32,20 +33,34 @@ class Rate:
     source: str
     start_s: float = 0.0
     notes: tuple[str, ...] = ()
+    origin_s: float = 0.0
+    by_column: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimeColumn:
-    """A column that may tell the time: `what` names it in messages; `exact` unless it is a computer's clock."""
+    """A column that may tell the time: `what` names it in messages; `index` is its place among the series."""
 
     what: str
     path: str
     stamps: NDArray[np.float64]
     unit_s: float
     is_clock: bool = False
+    index: int = -1
+    unit: CountedIn = CountedIn(1.0)
+    nameless: bool = False
+    _verdict: list[Uniform | Irregular] = field(default_factory=list, repr=False)
 
     def examine(self) -> Uniform | Irregular:
-        return examine(self.stamps, self.unit_s)
+        """Whether its stamps are those of uniform sampling."""
+        if not self._verdict:
+            self._verdict.append(examine(self.stamps, self.unit_s))
+        return self._verdict[0]
+
+    def rate_of_units(self) -> float:
+        """Samples a unit, whatever the unit is; NaN where they are not uniform."""
+        verdict = self.examine()
+        return verdict.rate_hz * self.unit_s if isinstance(verdict, Uniform) else math.nan
 
 
 _TIME_NAMES = re.compile(
@@ -61,38 +76,70 @@ def time_columns(contents: Contents, chosen: str | None, file: str) -> list[Time
     if chosen is not None:
         at = select(chosen, [(c.name, c.path) for c in series] + [(c.name, c.path) for c in clocks], file)
         if at < len(series):
-            return [_numeric_time(series[at], seconds_in(_unit(series[at])) or 1.0, "--time")]
+            return [_numeric_time(at, series[at], "--time")]
         return [_clock_time(clocks[at - len(series)])]
-    lengths = [len(s.values) for s in series]
-    usual = max(lengths, key=lengths.count)
-    found = []
-    for one in series:
-        unit_s = seconds_in(_unit(one))
-        if len(one.values) == usual and _is_time(one, unit_s) and np.isfinite(one.values).any():
-            found.append(_numeric_time(one, unit_s or 1.0))
+    found = [_numeric_time(i, one) for i, one in enumerate(series) if _is_time(one, seconds_in(_unit(one)))]
+    found = [column for column in found if np.isfinite(column.stamps).any()]
+    if contents.nameless and not found:
+        found = _nameless_times(contents)
+    places = {column.index for column in found}
+    lengths = {len(one.values) for i, one in enumerate(series) if i not in places}
+    # A column of time goes with channels of its length, if there are any.
+    found = [column for column in found if len(column.stamps) in lengths or not lengths]
     return found + [_clock_time(clock) for clock in clocks if np.isfinite(clock.seconds).any()]
+
+
+def _time_named(series: Series, unit_s: float | None) -> str:
+    """How plainly a name says time: "", "loosely" ("Time  1 - default sample rate", but not "time delay"), "plainly"."""
+    stem, unit = split_unit(re.split(r"[/.]", series.name)[-1])
+    stem = re.sub(r"\(.*\)$|\[.*\]$", "", stem).strip(" :_-'\"")
+    if (unit or series.unit) is not None and unit_s is None:
+        return ""
+    if _TIME_NAMES.fullmatch(stem):
+        return "plainly" if stem != "T" or unit_s is not None else "loosely"
+    return "loosely" if re.match(r"(time|zeit)\b", stem, re.IGNORECASE) else ""
 
 
 def _is_time(series: Series, unit_s: float | None) -> bool:
     """Time by its name; a name that means other things too (T, Time 1) needs a unit of time or rising values."""
-    stem, unit = split_unit(re.split(r"[/.]", series.name)[-1])
-    stem = re.sub(r"\(.*\)$|\[.*\]$", "", stem).strip(" :_-'\"")
-    if (unit or series.unit) is not None and unit_s is None:
-        return False
-    if _TIME_NAMES.fullmatch(stem):
-        return stem != "T" or unit_s is not None or bool(np.all(np.diff(series.values) > 0))
-    # "Time  1 - default sample rate" and the like, but not "time delay".
-    loose = re.match(r"(time|zeit)\b", stem, re.IGNORECASE) is not None
-    return loose and len(series.values) > 1 and bool(np.all(np.diff(series.values) > 0))
+    named = _time_named(series, unit_s)
+    if named != "loosely":
+        return named == "plainly"
+    return len(series.values) > 1 and bool(np.all(np.diff(series.values) > 0))
 
 
 def _unit(series: Series) -> str | None:
     return series.unit or split_unit(series.name)[1]
 
 
-def _numeric_time(series: Series, unit_s: float, how: str = "") -> TimeColumn:
+def _numeric_time(index: int, series: Series, how: str = "") -> TimeColumn:
+    """A column of numbers as time, in the unit that it states or that fits it best."""
+    unit = counted_in(series.values, seconds_in(_unit(series)))
     what = f"time column '{series.path}'" + (f" ({how})" if how else "")
-    return TimeColumn(what, series.path, series.values, unit_s)
+    return TimeColumn(what, series.path, series.values, unit.unit_s, index=index, unit=unit)
+
+
+def _nameless_times(contents: Contents) -> list[TimeColumn]:
+    """Where columns have no names: the first, if it rises evenly in steps that are no count, and others like it."""
+    first = contents.series[0]
+    if len(contents.series) < 2 or len(first.values) < 4:
+        return []
+    found: list[TimeColumn] = []
+    for index, one in enumerate(contents.series):
+        verdict = examine(one.values)
+        if isinstance(verdict, Irregular) or abs(verdict.rate_hz - 1) < 1e-6:
+            if index == 0:
+                return []
+            continue
+        if found and abs(verdict.rate_hz / found[0].rate_of_units() - 1) > _AGREEMENT:
+            continue
+        unit = counted_in(one.values, seconds_in(_unit(one)))
+        taken = "s" if unit.said is None else "time"
+        what = f"column '{one.path}' (it has no name, but rises evenly: taken as time in {taken})"
+        if taken == "time":
+            what = f"column '{one.path}' (it has no name, but rises evenly: taken as time)"
+        found.append(TimeColumn(what, one.path, one.values, unit.unit_s, index=index, unit=unit, nameless=True))
+    return found
 
 
 def _clock_time(clock: Clock) -> TimeColumn:
@@ -105,18 +152,20 @@ def settle(contents: Contents, columns: Sequence[TimeColumn], *, chosen: bool, f
         verdict = columns[0].examine()
         if isinstance(verdict, Irregular):
             raise RecordingError(f"{columns[0].what} {verdict.problem}", file=file, advice=_hint(verdict))
+        _certain(columns[0], file)
         ignored = [s for s in contents.statements if not _agree(verdict, s.rate_hz)]
-        said = tuple(_not_followed(s.source, s.rate_hz, "named time") for s in ignored)
-        return Rate(verdict.rate_hz, columns[0].what, verdict.start_s, said)
+        said = (*_unit_told(columns[0]), *(_not_followed(s.source, s.rate_hz, "named time") for s in ignored))
+        return Rate(verdict.rate_hz, columns[0].what, verdict.start_s, tuple(said), verdict.origin_s, by_column=True)
     stated = _stated(contents, file)
-    numeric = [column for column in columns if not column.is_clock]
+    named = [column for column in columns if not column.is_clock and not column.nameless]
+    nameless = [column for column in columns if column.nameless]
     clocks = [column for column in columns if column.is_clock]
-    told = _told(numeric, stated, file)
+    told = _told(named, stated, file)
     if stated is not None and stated.hz is None:
         return told if told is not None and told.hz is not None else stated
     rate = stated or told
     if stated is not None and told is not None:
-        rate = replace(stated, start_s=told.start_s, notes=(*stated.notes, *told.notes))
+        rate = replace(stated, start_s=told.start_s, origin_s=told.origin_s, notes=(*stated.notes, *told.notes))
     if rate is not None and rate.hz is None:
         return rate
     notes: list[str] = []
@@ -130,7 +179,76 @@ def settle(contents: Contents, columns: Sequence[TimeColumn], *, chosen: bool, f
             notes += _compare_clock(rate, clock, verdict, file)
     if rate is not None:
         return replace(rate, notes=(*rate.notes, *notes))
-    return _guessed(contents) or Rate(None, "the file states no sampling rate and has no time column")
+    if nameless:
+        verdict = nameless[0].examine()
+        assert isinstance(verdict, Uniform)
+        _certain(nameless[0], file)
+        told_of = tuple(_unit_told(nameless[0]))
+        return Rate(verdict.rate_hz, nameless[0].what, verdict.start_s, told_of, verdict.origin_s, by_column=True)
+    return Rate(None, _no_time(contents))
+
+
+def with_others(rate: Rate, others: Sequence[TimeColumn], file: str) -> Rate:
+    """The rate, unless channels of the same length have times of their own at another: then each has its own only."""
+    for other in others:
+        verdict = other.examine()
+        if rate.hz is None or not isinstance(verdict, Uniform) or _agree(verdict, rate.hz):
+            continue
+        if rate.by_column:
+            return Rate(None, f"{rate.source} says {rate.hz:g} Hz, but {other.what} {verdict.rate_hz:g} Hz")
+        raise RecordingError(
+            f"{rate.source} says {rate.hz:g} Hz, but {other.what} says {verdict.rate_hz:g} Hz",
+            file=file,
+            advice="give {rate_hz}",
+        )
+    return rate
+
+
+def _certain(column: TimeColumn, file: str) -> None:
+    """Refuses a column whose unit can only be guessed, or is not what it says."""
+    if column.unit.doubt:
+        raise RecordingError(
+            f"{column.what} {column.unit.doubt}",
+            file=file,
+            code="time_unit",
+            advice=f"give {{rate_hz}}, or {{unit}} '{column.path}=ms' (s, ms, us)",
+        )
+
+
+def _unit_told(column: TimeColumn) -> list[Said]:
+    said = column.unit.said
+    if said is None:
+        return []
+    return [Said(f"{column.what}: {said}", said.code, said.values, said.cause)]
+
+
+def _no_time(contents: Contents) -> str:
+    """That nothing tells the rate; a column that nearly does is named, with its defect."""
+    none = "the file states no sampling rate and has no time column"
+    lengths = [len(one.values) for one in contents.series]
+    for index, one in enumerate(contents.series):
+        unit_s = seconds_in(_unit(one))
+        named = _time_named(one, unit_s)
+        if not named and not (contents.nameless and index == 0):
+            continue
+        sound = one.values[np.isfinite(one.values)]
+        if len(sound) < 4:
+            continue
+        steps = np.diff(sound)
+        if not named and (np.count_nonzero(steps > 0) < 0.9 * len(steps) or bool(np.all(steps == 1))):
+            continue
+        if not steps.any():
+            continue
+        verdict = examine(one.values, unit_s or 1.0)
+        if isinstance(verdict, Irregular):
+            return f"the file states no sampling rate, and '{one.path}', which may be the time, {verdict.problem}"
+        if lengths.count(len(one.values)) == 1 and len(lengths) > 1:
+            usual = max(lengths, key=lengths.count)
+            return (
+                f"the file states no sampling rate, and '{one.path}', which may be the time, has {len(one.values)} "
+                f"samples where channels have {usual}"
+            )
+    return none
 
 
 def _stated(contents: Contents, file: str) -> Rate | None:
@@ -170,6 +288,8 @@ def _told(columns: Sequence[TimeColumn], stated: Rate | None, file: str) -> Rate
     if not uniform:
         return None
     column, first = uniform[0]
+    if stated is None or stated.hz is None:
+        _certain(column, file)
     if stated is not None and stated.hz is not None:
         for other, verdict in uniform:
             if not _agree(verdict, stated.hz):
@@ -185,13 +305,16 @@ def _told(columns: Sequence[TimeColumn], stated: Rate | None, file: str) -> Rate
                 f"{column.what} says {first.rate_hz:g} Hz, but {other.what} {verdict.rate_hz:g} Hz",
             )
     notes: list[str] = [Said(f"{c.what} {v.problem}; it was not used", "irregular_time") for c, v in irregular]
+    notes += _unit_told(column)
     if first.rounded and first.high_hz - first.low_hz > 2e-3 * first.rate_hz:
         words = (
             f"{column.what} is rounded: any rate from {first.low_hz:.6g} to {first.high_hz:.6g} Hz fits it; "
             "give the rate if you know better"
         )
         notes.append(Said(words, "rounded_time", (first.low_hz, first.high_hz)))
-    return Rate(first.rate_hz, column.what, first.start_s, tuple(notes))
+    elif (stated is None or stated.hz is None) and (said := rounded_step(first.rate_hz)) is not None:
+        notes.append(said)
+    return Rate(first.rate_hz, column.what, first.start_s, tuple(notes), first.origin_s, by_column=True)
 
 
 def _compare_clock(rate: Rate, clock: TimeColumn, verdict: Uniform | Irregular, file: str) -> list[str]:
@@ -208,18 +331,6 @@ def _compare_clock(rate: Rate, clock: TimeColumn, verdict: Uniform | Irregular, 
     raise RecordingError(
         f"{rate.source} says {rate.hz:g} Hz, but {clock.what} says {says:g} Hz", file=file, advice="give {rate_hz}"
     )
-
-
-def _guessed(contents: Contents) -> Rate | None:
-    """The first column where columns have no names, if it rises evenly in steps that are no count."""
-    first = contents.series[0]
-    if not contents.nameless or len(contents.series) < 2 or len(first.values) < 4:
-        return None
-    verdict = examine(first.values)
-    if isinstance(verdict, Irregular) or abs(verdict.rate_hz - 1) < 1e-6:
-        return None
-    source = f"column '{first.path}' (it has no name, but rises evenly: taken as time in s)"
-    return Rate(verdict.rate_hz, source, verdict.start_s)
 
 
 def doubts(contents: Contents, columns: Sequence[TimeColumn], rate_hz: float) -> list[str]:

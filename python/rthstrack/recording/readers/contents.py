@@ -9,15 +9,22 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+#: Names, in lower case, of a number that says when a channel was first sampled, in s.
+STARTS = ("t0", "t_0", "tstart", "t_start", "start_s", "start_time", "starttime", "x0", "wf_start_offset")
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Series:
-    """One column of numbers (n_samples,). `unit` is what the file states apart from the name."""
+    """One column of numbers (n_samples,). `unit` is what the file states apart from the name.
+
+    start_s: the time of the first sample, where the file states it for this column alone; None if it does not.
+    """
 
     name: str
     path: str
     unit: str | None
     values: NDArray[np.float64]
+    start_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
