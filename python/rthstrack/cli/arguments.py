@@ -47,7 +47,6 @@ def chosen(args: argparse.Namespace) -> dict[str, Any]:
     return {
         "targets": args.target or (),
         "measured": args.measured or (),
-        "commands": getattr(args, "command", None) or (),
         "rate_hz": args.rate,
         "time": args.time,
         "resample_hz": args.resample,

@@ -113,7 +113,7 @@ def assess_file(file: str, args: argparse.Namespace) -> list[Assessment]:
 
     Raises RecordingError, ChannelError or SignalError, with the file and the channels named.
     """
-    recording, _, pairs, proposal = read_chosen(file, **chosen(args))
+    recording, _, pairs, proposal = read_chosen(file, **chosen(args), commands=args.command or ())
     commands: Sequence[str | None] = args.command or [None] * len(pairs)
     if len(commands) != len(pairs):
         raise RecordingError(
@@ -179,11 +179,21 @@ def _assess(
     except SettingError as error:
         raise error.about(recording.file) from None
     said = list(assessment.warnings)
+    notes = [coded(note) for note in (recording.notes if part == "whole" else ())]
+    # What the number stands and falls with comes first.
+    said = [note for note in notes if note.code in _GUESSES] + said
     if proposal is not None and part == "whole":
         words = f"no channels were named: judged target '{asked.name}', measured '{answered.name}' ({proposal})"
         said.insert(0, Said(words, "channels_proposed"))
-    said += map(coded, recording.notes if part == "whole" else ())
-    return dataclasses.replace(assessment, warnings=tuple(said))
+    said += [note for note in notes if note.code not in _GUESSES]
+    guessed = [note.cause for note in map(coded, recording.notes) if note.code in _GUESSES]
+    guessed += [f"but {warning.cause}" for warning in assessment.warnings if warning.code == "copy"]
+    verdict = ", ".join([assessment.verdict, *guessed])
+    return dataclasses.replace(assessment, warnings=tuple(said), verdict=verdict)
+
+
+#: Notes on what is only a guess, which the verdict says too.
+_GUESSES = ("time_unit_guessed", "clocks_assumed", "clocks_aligned")
 
 
 def _check(args: argparse.Namespace, misuse: Callable[[str], Any]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from dataclasses import dataclass, replace
@@ -70,15 +71,13 @@ def timelines(contents: Contents, columns: Sequence[TimeColumn], file: str) -> T
     return Timelines(tuple(chosen.get(group) for group in of), main, tuple(notes))
 
 
-def _blocks(contents: Contents, columns: Sequence[TimeColumn]) -> dict[int, int]:
+def _blocks(contents: Contents, columns: Sequence[TimeColumn]) -> dict[float, int]:
     """Time columns that stand side by side are in one block: they speak of the same channels."""
-    places = {column.index for column in columns}
-    blocks, block = {}, 0
-    for index in range(len(contents.series)):
-        if index in places:
-            blocks[index] = block
-        else:
-            block += index - 1 in places
+    places = sorted(column.index for column in columns)
+    others = [index for index in range(len(contents.series)) if index not in places]
+    blocks = {places[0]: 0}
+    for before, after in itertools.pairwise(places):
+        blocks[after] = blocks[before] + any(before < index < after for index in others)
     return blocks
 
 
@@ -91,7 +90,7 @@ def _last(path: str) -> list[str]:
 
 
 def _nearest(
-    series: Series, index: int, columns: Sequence[TimeColumn], blocks: dict[int, int]
+    series: Series, index: int, columns: Sequence[TimeColumn], blocks: dict[float, int]
 ) -> tuple[TimeColumn, ...]:
     alike = [column for column in columns if len(column.stamps) == len(series.values)]
     if len(alike) < 2:
@@ -163,7 +162,7 @@ def own_times(contents: Contents, lines: Timelines, rate: Rate, *, given: bool) 
     from_column = not given and (rate.by_column or rate.hz is None)
     main = next((column for column in lines.main if isinstance(column.examine(), Uniform)), None)
     length = len(main.stamps) if main is not None and from_column else None
-    seen: dict[int, OwnTime] = {}
+    seen: dict[float, OwnTime] = {}
     found: list[OwnTime] = []
     for series, column in zip(contents.series, lines.of, strict=True):
         stated = of_channel.get(series.path)

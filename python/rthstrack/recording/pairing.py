@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rthstrack.errors import ChannelError
+from rthstrack.errors import ChannelError, RecordingError
+from rthstrack.recording.clocks import on_one_clock
+from rthstrack.recording.copies import is_copy
 from rthstrack.recording.names import FILLERS, GENERIC, quantities, role, words
 from rthstrack.units import quantity as unit_quantity
 from rthstrack.units import split_unit
@@ -36,8 +38,6 @@ _LIKENESS = 0.9
 _LONGEST_LAG_S = 0.25
 _MOST_SAMPLES = 1 << 16
 _MOST_CHANNELS = 16
-# Copies are equal to this share of their range, as far as print rounds.
-_COPY = 1e-9
 # An actuator that is left to itself loses so much that the gain is this or less.
 _LOSS = 0.92
 _CHOOSE = "choose: {target}, {measured}"
@@ -53,18 +53,6 @@ class _Named:
     rank: int
     quantity: str | None
     rest: tuple[str, ...]
-
-
-def is_copy(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
-    """Whether two channels hold the same samples, which two sensors never do."""
-    if a.shape != b.shape or a.size <= 16:
-        return False
-    if np.array_equal(a, b, equal_nan=True):
-        return True
-    with np.errstate(all="ignore"):
-        span = float(np.nanmax(a) - np.nanmin(a)) if np.isfinite(a).any() else 0.0
-        same_gaps = np.array_equal(np.isfinite(a), np.isfinite(b))
-        return bool(same_gaps and span > 0 and np.nanmax(np.abs(a - b)) <= _COPY * span)
 
 
 def propose_pair(recording: Recording) -> tuple[list[tuple[str, str]], str]:
@@ -248,7 +236,9 @@ def _by_likeness(recording: Recording, named: list[_Named]) -> tuple[int, int, s
     best, n_compared, n_rates = None, 0, 0
     for (a, x), (b, y) in itertools.combinations(candidates[:_MOST_CHANNELS], 2):
         one, other = channels[a.index], channels[b.index]
-        if len(x) != len(y) or one.time != other.time or not 0.5 < np.linalg.norm(y) / np.linalg.norm(x) < 2:
+        if one.time != other.time:
+            x, y = _together(recording, a.index, b.index)
+        if len(x) != len(y) or len(x) <= 16 or not 0.5 < np.linalg.norm(y) / np.linalg.norm(x) < 2:
             continue
         rate = one.time.rate_hz if one.time is not None else recording.rate_hz
         if rate is None:
@@ -286,6 +276,16 @@ def _by_likeness(recording: Recording, named: list[_Named]) -> tuple[int, int, s
     first, second = channels[target].name, channels[measured].name
     why = f"a guess, for no name tells: '{second}' follows '{first}' {when} (correlation {correlation:.3f}), {reason}"
     return target, measured, why
+
+
+def _together(recording: Recording, a: int, b: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Two channels with clocks of their own as they move together, less their means; nothing where they do not."""
+    try:
+        moved = on_one_clock(recording, (f"#{a}", f"#{b}")).channels
+    except RecordingError:
+        return np.zeros(0), np.zeros(0)
+    x, y = (moved[i].values[:_MOST_SAMPLES] for i in (a, b))
+    return (x - x.mean(), y - y.mean()) if np.ptp(x) > 0 and np.ptp(y) > 0 else (np.zeros(0), np.zeros(0))
 
 
 def _candidates(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rthstrack.errors import RecordingError
+from rthstrack.recording.names import FILLERS, role, words
 from rthstrack.recording.readers.stamps import Irregular, Uniform, examine
 from rthstrack.recording.recording import select
 from rthstrack.recording.time_units import CountedIn, counted_in, rounded_step
@@ -39,14 +40,15 @@ class Rate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimeColumn:
-    """A column that may tell the time: `what` names it in messages; `index` is its place among the series."""
+    """A column that may tell the time: `what` names it in messages; `index` is its place among the series,
+    a half before one for a column of dates."""
 
     what: str
     path: str
     stamps: NDArray[np.float64]
     unit_s: float
     is_clock: bool = False
-    index: int = -1
+    index: float = -1
     unit: CountedIn = CountedIn(1.0)
     nameless: bool = False
     _verdict: list[Uniform | Irregular] = field(default_factory=list, repr=False)
@@ -70,6 +72,9 @@ _TIME_NAMES = re.compile(
 )
 
 
+_TIME_WORDS = {"time", "times", "zeit", "temps", "tiempo", "tempo", "stamp", "timestamp"}
+
+
 def time_columns(contents: Contents, chosen: str | None, file: str) -> list[TimeColumn]:
     """The columns that may tell the time, best first; only the chosen one where one is."""
     series, clocks = contents.series, contents.clocks
@@ -77,7 +82,7 @@ def time_columns(contents: Contents, chosen: str | None, file: str) -> list[Time
         at = select(chosen, [(c.name, c.path) for c in series] + [(c.name, c.path) for c in clocks], file)
         if at < len(series):
             return [_numeric_time(at, series[at], "--time")]
-        return [_clock_time(clocks[at - len(series)])]
+        return _clock_times([clocks[at - len(series)]])
     found = [_numeric_time(i, one) for i, one in enumerate(series) if _is_time(one, seconds_in(_unit(one)))]
     found = [column for column in found if np.isfinite(column.stamps).any()]
     if contents.nameless and not found:
@@ -86,7 +91,7 @@ def time_columns(contents: Contents, chosen: str | None, file: str) -> list[Time
     lengths = {len(one.values) for i, one in enumerate(series) if i not in places}
     # A column of time goes with channels of its length, if there are any.
     found = [column for column in found if len(column.stamps) in lengths or not lengths]
-    return found + [_clock_time(clock) for clock in clocks if np.isfinite(clock.seconds).any()]
+    return found + _clock_times(clocks)
 
 
 def _time_named(series: Series, unit_s: float | None) -> str:
@@ -97,7 +102,13 @@ def _time_named(series: Series, unit_s: float | None) -> str:
         return ""
     if _TIME_NAMES.fullmatch(stem):
         return "plainly" if stem != "T" or unit_s is not None else "loosely"
-    return "loosely" if re.match(r"(time|zeit)\b", stem, re.IGNORECASE) else ""
+    if re.match(r"(time|zeit)\b", stem, re.IGNORECASE):
+        return "loosely"
+    # t1, t_target, cmd time, but not x_t.
+    found = words(stem)
+    rest = [word for i, word in enumerate(found) if word not in _TIME_WORDS and not (word == "t" and i == 0)]
+    of_one = all(word.isdigit() or role([word]).name is not None or word in FILLERS for word in rest)
+    return "loosely" if len(rest) < len(found) and of_one else ""
 
 
 def _is_time(series: Series, unit_s: float | None) -> bool:
@@ -105,7 +116,16 @@ def _is_time(series: Series, unit_s: float | None) -> bool:
     named = _time_named(series, unit_s)
     if named != "loosely":
         return named == "plainly"
-    return len(series.values) > 1 and bool(np.all(np.diff(series.values) > 0))
+    values = ended(series.values)
+    return len(values) > 1 and bool(np.all(np.diff(values) > 0))
+
+
+def ended(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values up to the last that is a number."""
+    if not len(values) or not math.isnan(values[-1]):
+        return values
+    known = np.flatnonzero(~np.isnan(values))
+    return values[: known[-1] + 1] if known.size else values[:0]
 
 
 def _unit(series: Series) -> str | None:
@@ -126,7 +146,7 @@ def _nameless_times(contents: Contents) -> list[TimeColumn]:
         return []
     found: list[TimeColumn] = []
     for index, one in enumerate(contents.series):
-        verdict = examine(one.values)
+        verdict = examine(ended(one.values))
         if isinstance(verdict, Irregular) or abs(verdict.rate_hz - 1) < 1e-6:
             if index == 0:
                 return []
@@ -142,8 +162,17 @@ def _nameless_times(contents: Contents) -> list[TimeColumn]:
     return found
 
 
-def _clock_time(clock: Clock) -> TimeColumn:
-    return TimeColumn(f"date-time column '{clock.path}'", clock.path, clock.seconds, 1.0, is_clock=True)
+def _clock_times(clocks: Sequence[Clock]) -> list[TimeColumn]:
+    """Columns of dates as time, from the earliest first entry of all."""
+    known = [clock for clock in clocks if np.isfinite(clock.seconds).any()]
+    earliest = min((clock.first_ns for clock in known if clock.first_ns is not None), default=0)
+    found = []
+    for clock in known:
+        late_s = 0.0 if clock.first_ns is None else (clock.first_ns - earliest) / 1e9
+        stamps = clock.seconds + late_s if late_s else clock.seconds
+        what = f"date-time column '{clock.path}'"
+        found.append(TimeColumn(what, clock.path, stamps, 1.0, is_clock=True, index=clock.after - 0.5))
+    return found
 
 
 def settle(contents: Contents, columns: Sequence[TimeColumn], *, chosen: bool, file: str) -> Rate:
@@ -174,7 +203,7 @@ def settle(contents: Contents, columns: Sequence[TimeColumn], *, chosen: bool, f
         if rate is None:
             if isinstance(verdict, Irregular):
                 raise RecordingError(f"{clock.what} {verdict.problem}", file=file, advice=_hint(verdict))
-            rate = Rate(verdict.rate_hz, clock.what)
+            rate = Rate(verdict.rate_hz, clock.what, origin_s=verdict.origin_s, by_column=True)
         elif rate.hz is not None:
             notes += _compare_clock(rate, clock, verdict, file)
     if rate is not None:

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 import os
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rthstrack.errors import SettingError
 from rthstrack.recording.clocks import clocks_told, own_times, timelines
-from rthstrack.recording.rate import Rate, doubts, settle, time_columns, with_others
+from rthstrack.recording.rate import Rate, doubts, ended, settle, time_columns, with_others
 from rthstrack.recording.readers import read_contents
 from rthstrack.recording.readers.stamps import Uniform
 from rthstrack.recording.recording import Recording, channels_of
 from rthstrack.recording.resampling import resample
 
 if TYPE_CHECKING:
+    from rthstrack.recording.clocks import Timelines
+    from rthstrack.recording.rate import TimeColumn
     from rthstrack.recording.readers.contents import Contents
 
 
@@ -58,11 +61,11 @@ def recording_from(
     resample_hz: float | None = None,
 ) -> Recording:
     """Settles the sampling rate of a file's contents, as `read_recording` describes."""
-    columns = time_columns(contents, time, file)
-    lines = timelines(contents, [c for c in columns if not c.is_clock] if time is None else [], file)
+    contents, columns, lines = _lines(contents, time, file)
+    numeric = [column for column in columns if not column.is_clock]
     if resample_hz is not None:
         return resample(contents, file, columns, lines, resample_hz)
-    main = [*lines.main, *(column for column in columns if column.is_clock)] if time is None else columns
+    main = [*lines.main, *(c for c in columns if c.is_clock and numeric)] if time is None else columns
     if rate_hz is not None:
         rate = Rate(float(rate_hz), "--rate", 0.0, tuple(doubts(contents, columns, rate_hz)))
     else:
@@ -71,7 +74,26 @@ def recording_from(
         others = {c for c in lines.of if c is not None and c not in lines.main and len(c.stamps) == length}
         rate = with_others(rate, sorted(others, key=lambda c: c.index), file)
     times = own_times(contents, lines, rate, given=rate_hz is not None)
-    places = {column.index for column in columns if isinstance(column.examine(), Uniform)}
+    places = {int(c.index) for c in columns if not c.is_clock and isinstance(c.examine(), Uniform)}
     channels = channels_of(contents, contents.series, times, places)
     notes = (*contents.notes, *rate.notes, *lines.notes, *clocks_told(channels))
     return Recording(file, contents.format, channels, rate.hz, rate.source, rate.start_s, notes)
+
+
+def _lines(contents: Contents, time: str | None, file: str) -> tuple[Contents, list[TimeColumn], Timelines]:
+    """Which columns tell whose time; where one ends before the table, it and its channels end there."""
+    columns = time_columns(contents, time, file)
+    numeric = [column for column in columns if not column.is_clock]
+    lines = timelines(contents, (numeric or columns) if time is None else [], file)
+    ends = {column.index: len(ended(column.stamps)) for column in numeric}
+    if time is not None or all(ends[column.index] in (0, len(column.stamps)) for column in numeric):
+        return contents, columns, lines
+    series = list(contents.series)
+    for i, own in enumerate(lines.of):
+        last = ends.get(float(i) if own is None else own.index, 0)
+        if 0 < last < len(series[i].values) and len(ended(series[i].values)) <= last:
+            series[i] = replace(series[i], values=series[i].values[:last])
+    contents = replace(contents, series=tuple(series))
+    columns = time_columns(contents, None, file)
+    numeric = [column for column in columns if not column.is_clock]
+    return contents, columns, timelines(contents, numeric or columns, file)

@@ -50,7 +50,7 @@ def resample(
             f"rate of {column.what}), found {hz:g} Hz; {why}"
         )
     series, times, left_out = [], [], []
-    grids: dict[int, _Grid] = {}
+    grids: dict[float, _Grid] = {}
     for i, one in enumerate(contents.series):
         own = lines.of[i]
         own = column if own is None or own in lines.main else own

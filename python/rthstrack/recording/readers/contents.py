@@ -29,11 +29,17 @@ class Series:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clock:
-    """A column of dates or times of day: seconds since its first entry (n_samples,), NaN where a cell is empty."""
+    """A column of dates or times of day: seconds since its first entry (n_samples,), NaN where a cell is empty.
+
+    first_ns: its first entry, in ns from any day that all clocks of the file share; None if not known. after: how many
+    series stand before it.
+    """
 
     name: str
     path: str
     seconds: NDArray[np.float64]
+    first_ns: int | None = None
+    after: int = 0
 
 
 @dataclass(frozen=True, slots=True)

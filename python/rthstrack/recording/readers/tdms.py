@@ -37,7 +37,7 @@ def read(path: Path) -> Contents:
                 name = f"{group.name}/{channel.name}"
                 values = np.asarray(channel[:])
                 if values.dtype.kind == "M":
-                    clocks.append(clock(name, values))
+                    clocks.append(clock(name, values, len(series)))
                 elif values.size == 0 or not is_numeric(values.dtype):
                     notes.append(f"'{name}' {'holds no numbers' if values.size else 'is empty'}, no channel")
                 else:

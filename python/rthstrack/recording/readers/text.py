@@ -67,7 +67,9 @@ def read(path: Path) -> Contents:
         elif kind == "text":
             notes.append(f"'{label}' {f'holds text in {values} lines' if values else 'is empty'}, no channel")
         else:
-            clocks.append(Clock(label, label, seconds_since_first(values, dated=kind == "dates")))
+            first = next((int(one) for one in values if one != np.iinfo(np.int64).min), None)
+            seconds = seconds_since_first(values, dated=kind == "dates")
+            clocks.append(Clock(label, label, seconds, first, len(series)))
     statements = rate_statements(table["preamble"], notes, decimal_comma=table["decimal_comma"])
     series = _own_starts(series, table["preamble"], decimal_comma=table["decimal_comma"])
     form = f"text, {table['delimiter']} between columns" if len(table["columns"]) > 1 else "text, one column"
