@@ -27,7 +27,11 @@ def add_signals(parser: argparse.ArgumentParser, title: str) -> argparse._Argume
         "--scale", action="append", type=scale, default=[], metavar="CHANNEL=X", help="multiply a channel"
     )
     signals.add_argument(
-        "--unit", action="append", type=unit, default=[], metavar="[CHANNEL=]U",
+        "--unit",
+        action="append",
+        type=unit,
+        default=[],
+        metavar="[CHANNEL=]U",
         help="unit of a channel (time too), or of all that are judged and state none",
     )
     rate = signals.add_mutually_exclusive_group()

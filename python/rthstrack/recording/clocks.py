@@ -252,7 +252,9 @@ def on_one_clock(recording: Recording, selectors: Sequence[str]) -> Recording:
             f"'{c.name}' {t.start_s:.10g} to {t.start_s + (len(c.values) - 1) / f:.10g} s"
             for t, c, f in zip(times, chosen, rates, strict=True)
         )
-        raise RecordingError(f"the channels have no time in common: {listed}", file=recording.file, code="no_common_time")
+        raise RecordingError(
+            f"the channels have no time in common: {listed}", file=recording.file, code="no_common_time"
+        )
     channels, notes = list(recording.channels), list(recording.notes)
     for place, channel, time in zip(places, chosen, times, strict=True):
         values, how = _moved(channel.values, time, clock, range(first, last + 1))

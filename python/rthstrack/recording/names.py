@@ -12,8 +12,8 @@ _ROLES = {
     "target": (
         "target targ tgt calculated calc calculada desired des xt objetivo objectif ziel 目標 目标 期望 목표 цель",
         "reference ref setpoint sp demand dmd soll sollwert consigne consigna referencia riferimento référence rampe "
-        "設定 设定 給定 给定 задание уставка 설정",
-        "command cmd cmnd commanded dcmd xc comando commande befehl kommando stellwert 命令 指令 команда 명령",
+        "設定 设定 給定 给定 задание заданное заданный задано уставка 설정",
+        "command cmd cmnd commanded dcmd xc comando comandado comandada comandato commande commandé commandée befehl kommando stellwert 命令 指令 команда 명령",
     ),
     "measured": (
         "measured meas measure msd mes xm ist istwert mesure mesuré mesurée mesures medido medida medição misurato "
@@ -42,12 +42,26 @@ _LETTERS = {"t": ("target", 0), "d": ("target", 0), "r": ("target", 1), "c": ("t
 _BEFORE_LETTER = {"x", "u", "d", "f", "disp", "displ", "displacement", "pos", "position", "force", "frc"}
 # Words that say which of several alike a channel is only where nothing else does: a pair may differ in them.
 FILLERS = {"signal", "sig", "channel", "chan", "ch", "data", "value", "values", "val", "out", "output", "in", "input"}
-FILLERS |= {"actuator", "servo", "axial", "controller", "control", "ctrl", "daq", "dac", "adc", "of", "the", "from", "to"}
-FILLERS |= {"ai", "ao", "absolute", "relative", "total", "raw", "filtered", "filt", "model", "numerical", "specimen", "y"}
+FILLERS |= {
+    "actuator",
+    "servo",
+    "axial",
+    "controller",
+    "control",
+    "ctrl",
+    "daq",
+    "dac",
+    "adc",
+    "of",
+    "the",
+    "from",
+    "to",
+}
+FILLERS |= {"ai", "ao", "absolute", "relative", "total", "raw", "filtered", "filt", "model", "numerical", "specimen"}
 FILLERS |= {"valor", "valeur", "wert", "канал", "値", "值", "信号"}
 # What a name may consist of that says nothing at all.
 GENERIC = {"channel", "chan", "ch", "column", "col", "ai", "ao", "untitled", "signal", "sig", "var", "data", "value"}
-GENERIC |= {"values", "array", "input", "output", "x", "kanal", "voie", "canal", "通道", "チャンネル"}
+GENERIC |= {"values", "array", "input", "output", "kanal", "voie", "canal", "通道", "チャンネル"}
 
 
 def plain(text: str) -> str:
@@ -70,7 +84,9 @@ _UNSPACED = sorted(
     reverse=True,
 )
 _PARTED = re.compile("|".join(map(re.escape, _UNSPACED)))
-_COMPOUND = re.compile(r"\b(soll|ist|ziel)(?=weg|position|pos|kraft|lage|hub|verschiebung|last)|(?<=weg|ion|aft|hub)(soll|ist)\b")
+_COMPOUND = re.compile(
+    r"\b(soll|ist|ziel)(?=weg|position|pos|kraft|lage|hub|verschiebung|last)|(?<=weg|ion|aft|hub)(soll|ist)\b"
+)
 _JOINED = re.compile(r"\b(set|load|feed|soll|ist) (point|cell|back|wert)\b")
 # The current position is no electric current.
 _CURRENT = re.compile(r"\bcurrent (?=pos|disp|stroke|value|force|load|angle)")

@@ -67,28 +67,47 @@ def propose_pair(recording: Recording) -> tuple[list[tuple[str, str]], str]:
     channels = recording.channels
     judged = [i for i, c in enumerate(channels) if not c.is_time]
     copies: list[str] = []
-    for depth in (1, 2, 3):
-        named = [_read_name(i, channels[i], depth) for i in judged]
-        if depth > 1 and not _both_roles(named):
+    several: ChannelError | None = None
+    for of_role, of_rest in ((1, 1), (1, 9), (2, 9), (3, 9)):
+        named = [_read_name(i, channels[i], of_role, of_rest) for i in judged]
+        if of_role > 1 and not {"target", "measured"} <= {one.role for one in named}:
             continue
-        pairs = _by_name(named, channels, recording.file, copies)
+        try:
+            pairs = _by_name(named, channels, recording.file, copies)
+        except ChannelError as error:
+            several = several or error
+            continue
         if pairs:
             shown = " and ".join(f"'{channels[t].name}' and '{channels[m].name}'" for t, m in pairs[:3])
             shown += ", ..." if len(pairs) > 3 else ""
             why = f"{shown} are named like target and measured"
             return [(_selector(channels, t), _selector(channels, m)) for t, m in pairs], why
-    named = [_read_name(i, channels[i], 1) for i in judged]
+    if several is not None:
+        raise several
     if copies:
         raise ChannelError(
-            f"no likely target/measured pair: {'; '.join(dict.fromkeys(copies))}", file=recording.file, advice=_NAME
+            f"no likely target/measured pair: {'; '.join(dict.fromkeys(copies))}",
+            file=recording.file,
+            code="copy",
+            advice=_NAME,
         )
+    named = [_read_name(i, channels[i], 1, 9) for i in judged]
     if any(one.role for one in named):
-        roles = ", ".join(f"'{channels[one.index].name}' ({one.role})" for one in named if one.role)
         raise ChannelError(
-            f"no likely target/measured pair: found only {roles}", file=recording.file, advice=_NAME
+            f"no likely target/measured pair: found only {_half(named, channels)}", file=recording.file, advice=_NAME
         )
     target, measured, why = _by_likeness(recording, named)
     return [(_selector(channels, target), _selector(channels, measured))], why
+
+
+def _half(named: Sequence[_Named], channels: tuple[Channel, ...]) -> str:
+    """The channels of the only role that there is, and those that may have the other."""
+    found = [one for one in named if one.role]
+    said = ", ".join(f"'{channels[one.index].name}' ({one.role})" for one in found[:6])
+    kinds = {one.quantity for one in found} - {None}
+    others = [f"'{channels[one.index].name}'" for one in named if one.role is None and one.quantity in kinds]
+    missing = "measured" if found[0].role == "target" else "target"
+    return f"{said}; {missing} may be {' or '.join(others[:4])}" if others else said
 
 
 def _selector(channels: tuple[Channel, ...], index: int) -> str:
@@ -97,37 +116,40 @@ def _selector(channels: tuple[Channel, ...], index: int) -> str:
     return path if alike == 1 else f"#{index}"
 
 
-def _both_roles(named: Sequence[_Named]) -> bool:
-    return {"target", "measured"} <= {one.role for one in named}
+def _read_name(index: int, channel: Channel, of_role: int, of_rest: int) -> _Named:
+    """What a channel's name says: of the role in its last `of_role` parts, of which one it is in the last `of_rest`.
 
-
-def _read_name(index: int, channel: Channel, depth: int) -> _Named:
-    """What a channel's name says, and for a `depth` of 2 or 3 what it stands in: the word of a path is not its own."""
+    The word in a path is not the word of a channel, so that the role is looked for in the name first.
+    """
     stem, unit = split_unit(channel.name)
     if channel.unit is None and unit is not None:
         # Such as disp_m beside disp_t: the suffix was found to be no unit.
         stem = channel.name
-    parts = [part for part in re.split(r"[/.](?=[^\W\d])", stem) if part]
-    if channel.path != channel.name and depth > 1:
-        parts = [part for part in re.split(r"[/.](?=[^\W\d])", channel.path) if part][:-1] + parts[-1:]
-    within = words(" ".join(parts[-depth:])) if depth > 1 else words(parts[-1] if parts else stem)
-    own = words(parts[-1] if parts else stem)
-    found = role(own) if role(own).name else role(within)
-    text = own if role(own).name else within
+    parts = _parts(stem)
+    if channel.path != channel.name:
+        parts = [*_parts(channel.path)[:-1], parts[-1]]
+    spoken = [words(part) for part in parts]
+    text = [word for part in spoken[-max(of_role, of_rest) :] for word in part]
+    for depth in range(1, of_role + 1):
+        within = [word for part in spoken[-depth:] for word in part]
+        found = role(within)
+        if found.name:
+            break
+    at = found.at + len(text) - len(within) if found.name else -1
     kinds = quantities(text)
     told = {kind for _, kind in kinds}
-    # Of "displacement error" and "strain position" the last word is the thing.
+    # An error of displacement is no displacement.
     kind = "other" if "other" in told else (kinds[0][1] if kinds else None)
-    measures = _BY_UNIT.get(unit_quantity(channel.unit) or "")
-    kind = kind if kind == "other" else measures or kind
-    used = {found.at, *(i for i, _ in kinds)}
-    rest = tuple(word for i, word in enumerate(text) if i not in used)
-    return _Named(index, found.name, found.rank, kind, rest)
+    kind = kind if kind == "other" else _BY_UNIT.get(unit_quantity(channel.unit) or "") or kind
+    used = {at, *(i for i, _ in kinds)}
+    return _Named(index, found.name, found.rank, kind, tuple(word for i, word in enumerate(text) if i not in used))
 
 
-def _by_name(
-    named: list[_Named], channels: tuple[Channel, ...], file: str, copies: list[str]
-) -> list[tuple[int, int]]:
+def _parts(path: str) -> list[str]:
+    return [part for part in re.split(r"[/.](?=[^\W\d])", path) if part] or [path]
+
+
+def _by_name(named: list[_Named], channels: tuple[Channel, ...], file: str, copies: list[str]) -> list[tuple[int, int]]:
     """Pairs by name, of one quantity and length: displacement where there is any, else what there is."""
     for wanted in (
         ("displacement", None),
@@ -145,6 +167,7 @@ def _by_name(
             measured = _bare(targets, named, channels)
         if not (targets and measured):
             continue
+        targets = _once(targets, channels)
         measured, said = _without_copies(targets, measured, channels)
         copies += said
         if not measured:
@@ -173,6 +196,15 @@ def _bare(targets: list[_Named], named: list[_Named], channels: tuple[Channel, .
     ]
 
 
+def _once(found: list[_Named], channels: tuple[Channel, ...]) -> list[_Named]:
+    """Of copies the one with the best word."""
+    kept: list[_Named] = []
+    for one in sorted(found, key=lambda one: one.rank):
+        if not any(is_copy(channels[k.index].values, channels[one.index].values) for k in kept):
+            kept.append(one)
+    return sorted(kept, key=lambda one: one.index)
+
+
 def _without_copies(
     targets: list[_Named], measured: list[_Named], channels: tuple[Channel, ...]
 ) -> tuple[list[_Named], list[str]]:
@@ -182,11 +214,11 @@ def _without_copies(
     for one in measured:
         values = channels[one.index].values
         of = next((t for t in targets if is_copy(channels[t.index].values, values)), None)
-        if of is not None:
-            said.append(f"'{channels[one.index].name}' is an exact copy of '{channels[of.index].name}'")
-        elif not any(is_copy(channels[k.index].values, values) for k in kept):
+        if of is None:
             kept.append(one)
-    return kept, said
+        else:
+            said.append(f"'{channels[one.index].name}' is an exact copy of '{channels[of.index].name}'")
+    return _once(kept, channels), said
 
 
 def _matched(targets: list[_Named], measured: list[_Named]) -> list[tuple[int, int]]:
@@ -310,8 +342,11 @@ def _candidates(
 
 
 def _two_of_a_kind(a: _Named, b: _Named) -> bool:
-    """Whether names say that two channels are one thing at two places ('disp 1', 'disp 2'): they tell a quantity."""
-    return a.quantity is not None and a.quantity == b.quantity and a.rest != b.rest and bool(a.rest and b.rest)
+    """Whether names say that two channels are one thing at two places: 'disp north', 'disp south'; 'x1', 'x2'."""
+    if a.quantity != b.quantity or a.rest == b.rest or not (a.rest and b.rest):
+        return False
+    said = [[word for word in one.rest if not word.isdigit() and word not in GENERIC] for one in (a, b)]
+    return a.quantity is not None or (said[0] == said[1] != [])
 
 
 def _which_is_target(

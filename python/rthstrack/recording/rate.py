@@ -65,6 +65,8 @@ class TimeColumn:
         return verdict.rate_hz * self.unit_s if isinstance(verdict, Uniform) else math.nan
 
 
+# Names of what may count time, in a unit that nobody knows.
+_HINTS = re.compile(r"tick|clock|count|date|stamp", re.IGNORECASE)
 _TIME_NAMES = re.compile(
     r"t|times?|tout|zeit|messzeit|temps|tiempo|tempo|x[_ ]values?|time[ _-]?stamps?|time[ _-]?(?:axis|vector|base|\d+)|"
     r"(?:elapsed|running|relative|test|total|run|sample|measurement|record|simulation|sim)[ _-]?time",
@@ -102,7 +104,7 @@ def _time_named(series: Series, unit_s: float | None) -> str:
         return ""
     if _TIME_NAMES.fullmatch(stem):
         return "plainly" if stem != "T" or unit_s is not None else "loosely"
-    if re.match(r"(time|zeit)\b", stem, re.IGNORECASE):
+    if re.match(r"(time|zeit)\b|(date|datum|fecha)[ _-]?(time|zeit)?$", stem, re.IGNORECASE):
         return "loosely"
     # t1, t_target, cmd time, but not x_t.
     found = words(stem)
@@ -240,7 +242,7 @@ def _certain(column: TimeColumn, file: str) -> None:
             f"{column.what} {column.unit.doubt}",
             file=file,
             code="time_unit",
-            advice=f"give {{rate_hz}}, or {{unit}} '{column.path}=ms' (s, ms, us)",
+            advice=f"give {{rate_hz}}, or {{unit}} '{column.path}={column.unit.else_in}'",
         )
 
 
@@ -276,6 +278,13 @@ def _no_time(contents: Contents) -> str:
             return (
                 f"the file states no sampling rate, and '{one.path}', which may be the time, has {len(one.values)} "
                 f"samples where channels have {usual}"
+            )
+    for one in (one for one in contents.series if _HINTS.search(one.name)):
+        verdict = examine(one.values)
+        if isinstance(verdict, Uniform) and abs(verdict.rate_hz - 1) > 1e-6:
+            return (
+                f"the file states no sampling rate, and '{one.path}' rises evenly by {1 / verdict.rate_hz:.6g}, but no "
+                "name or unit says that it is the time"
             )
     return none
 

@@ -24,9 +24,7 @@ if TYPE_CHECKING:
     from rthstrack.recording.readers.contents import Contents
 
 
-def resample(
-    contents: Contents, file: str, columns: Sequence[TimeColumn], lines: Timelines, hz: float
-) -> Recording:
+def resample(contents: Contents, file: str, columns: Sequence[TimeColumn], lines: Timelines, hz: float) -> Recording:
     """Every channel on a uniform grid from the first stamp on, by a cubic spline through the samples.
 
     Those with a time column of their own stand on the same grid, and begin where that does.

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 _SLOWEST_HZ, _FASTEST_HZ, _SHORTEST_S = 10.0, 20e3, 1.0
 # A stated unit is doubted only beyond these.
 _DOUBTED_SLOW_HZ, _DOUBTED_FAST_HZ = 1.0, 50e3
+_FASTEST_KNOWN_HZ = 2e5
 _DAY_S = 86_400.0
 # Stamps of this size count from a fixed day: (least, greatest, size of one in s, what they are).
 _EPOCHS = (
@@ -28,11 +29,13 @@ _UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"), (_DAY_S, "days"
 
 
 class CountedIn(NamedTuple):
-    """How many seconds one is; what is said of it where nobody stated it; why it is not known, if it is not."""
+    """How many seconds one is; what is said of it where nobody stated it; why it is not known, if it
+    is not, and what else it may be."""
 
     unit_s: float
     said: Said | None = None
     doubt: str = ""
+    else_in: str = "ms"
 
 
 def counted_in(stamps: NDArray[np.float64], stated_s: float | None) -> CountedIn:
@@ -51,11 +54,9 @@ def counted_in(stamps: NDArray[np.float64], stated_s: float | None) -> CountedIn
         if least <= largest <= greatest:
             return CountedIn(unit_s, Said(f"its values are {what}", "time_unit", [unit_s]))
     hz = 1 / step
-    # An hour-long step is no matter of units.
+    # In seconds nobody writes whole numbers only, unless the rate is low.
     whole = bool(np.all(sound == np.rint(sound)))
-    if _DOUBTED_FAST_HZ >= hz >= (_SLOWEST_HZ if whole else _DOUBTED_SLOW_HZ):
-        return CountedIn(1.0)
-    if hz > _DOUBTED_FAST_HZ and not 2e4 < largest < 9e5 and hz <= 1e5:
+    if _FASTEST_KNOWN_HZ >= hz >= (_SLOWEST_HZ if whole else _DOUBTED_SLOW_HZ):
         return CountedIn(1.0)
     likely = [(unit_s, name) for unit_s, name in _UNITS if _plausible(unit_s, step, span)]
     if step == 1 and whole:
@@ -65,7 +66,7 @@ def counted_in(stamps: NDArray[np.float64], stated_s: float | None) -> CountedIn
         return CountedIn(
             unit_s,
             Said(
-                f"its unit is not stated: taken as {name}, {1 / (step * unit_s):.6g} Hz, for in s it would be {hz:.6g} Hz",
+                f"its unit is not stated: taken as {name}, {1 / (step * unit_s):.4g} Hz, for in s it would be {hz:.4g} Hz",
                 "time_unit_guessed",
                 (unit_s, 1 / (step * unit_s)),
                 f"if the time is in {name}",
@@ -91,13 +92,15 @@ def _stated(stated_s: float, step: float, span: float) -> CountedIn:
         f"says that it is in {own}, which makes {hz:.6g} Hz and {span * stated_s:.4g} s in all; in {name} it would be "
         f"{1 / (step * other_s):.6g} Hz and {span * other_s:.4g} s"
     )
-    return CountedIn(stated_s, None, doubt)
+    return CountedIn(stated_s, None, doubt, name)
 
 
 def _plausible(unit_s: float, step: float, span: float) -> bool:
     return _SLOWEST_HZ <= 1 / (step * unit_s) <= _FASTEST_HZ and span * unit_s >= _SHORTEST_S
 
 
+# A rate is known to so many digits; what rounding a step takes from it is more.
+_ROUNDED_AWAY = 1e-5
 # Rates that laboratories have, beside the powers of two.
 _USUAL_HZ = (*(2.0**k for k in range(5, 17)), 30, 60, 120, 240, 300, 600, 1200, 2400, 3000, 6000, 12000)
 
@@ -106,13 +109,10 @@ def rounded_step(hz: float) -> Said | None:
     """That a step such as 0.000977 s may be that of 1024 Hz, rounded before it was added up."""
     step = 1 / hz
     for usual in _USUAL_HZ:
-        if abs(hz / usual - 1) < 1e-9 or abs(hz / usual - 1) > 0.01:
+        if not _ROUNDED_AWAY < abs(hz / usual - 1) < 0.01:
             continue
         for decimals in range(3, 8):
-            if abs(round(1 / usual, decimals) - step) < 1e-9 * step and abs(usual * step - 1) > 1e-7:
-                words = (
-                    f"the step of {step:.9g} s makes {hz:.7g} Hz: is it {usual:g} Hz, its step rounded? "
-                    f"({1e6 * (usual / hz - 1):+.3g} ppm)"
-                )
+            if abs(round(1 / usual, decimals) / step - 1) < _ROUNDED_AWAY:
+                words = f"the step of {step:.5g} s makes {hz:.7g} Hz: is it {usual:g} Hz, its step rounded? (--rate)"
                 return Said(words, "rounded_step", (hz, usual))
     return None
