@@ -13,7 +13,7 @@ from rthstrack.evaluation.presets import PRESETS
 from rthstrack.units import is_unit
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from rthstrack.errors import RthstrackError
 
@@ -46,6 +46,17 @@ def add_signals(parser: argparse.ArgumentParser, title: str) -> argparse._Argume
     return signals
 
 
+def files_in(paths: Sequence[str]) -> list[str]:
+    """The files named, with those of each folder in its place, in order of their names; an empty folder is itself."""
+    found = []
+    for path in paths:
+        inside = sorted(Path(path).iterdir()) if Path(path).is_dir() else []
+        inside = [one for one in inside if one.is_file() and not one.name.startswith(".")]
+        # LabVIEW's index beside a TDMS file is no recording.
+        found += [str(one) for one in inside if one.suffix != ".tdms_index"] or [path]
+    return found
+
+
 def chosen(args: argparse.Namespace) -> dict[str, Any]:
     """What `add_signals` asks for, as the arguments of `read_chosen`."""
     return {
@@ -71,6 +82,7 @@ OPTIONS = {
     "resample_hz": "--resample HZ",
     "fill": "--fill SAMPLES",
     "unit": "--unit",
+    "align": "--align",
 }
 
 

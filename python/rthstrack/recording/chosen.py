@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from rthstrack.errors import ChannelError, RecordingError, SettingError
 from rthstrack.recording.clocks import on_one_clock
@@ -12,15 +15,17 @@ from rthstrack.recording.pairing import propose_pair
 from rthstrack.recording.rate import time_columns
 from rthstrack.recording.readers import read_contents
 from rthstrack.recording.reading import checked_rates, recording_from
-from rthstrack.recording.recording import frozen, select
+from rthstrack.recording.recording import OwnTime, Recording, frozen, select
 from rthstrack.said import Said
 from rthstrack.units import is_unit, quantity, size_in_si
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from numpy.typing import NDArray
+
     from rthstrack.recording.readers.contents import Contents
-    from rthstrack.recording.recording import Recording
+    from rthstrack.recording.recording import Channel
 
 
 class ChosenPairs(NamedTuple):
@@ -84,6 +89,131 @@ def read_chosen(
         why = f"no sampling rate: {recording.rate_source}"
         raise RecordingError(why, file=file, advice="give {rate_hz} or {time}")
     return ChosenPairs(recording, recording.rate_hz, pairs, proposal)
+
+
+def read_two(
+    target: tuple[str, str],
+    measured: tuple[str, str],
+    *,
+    align: bool = False,
+    rate_hz: float | None = None,
+    time: str | None = None,
+    resample_hz: float | None = None,
+    units: Mapping[str, str] | None = None,
+    scale: Mapping[str, float] | None = None,
+    fill: int | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
+) -> ChosenPairs:
+    """Target out of one file, measured out of another, each given as (file, channel), on the clock they have in common.
+
+    align: where they have none, measured is laid where it resembles target most; the delay then says nothing.
+    Raises RecordingError, ChannelError, SettingError; without a clock in common, unless `align` is asked for.
+    """
+    checked_rates(rate_hz, resample_hz)
+    sides: list[tuple[Channel, str, Recording]] = []
+    from_ns = 0
+    for file, selector in (target, measured):
+        contents, left_units, left_scale = of_time(read_contents(file), time, units or {}, {}, file)
+        recording = recording_from(contents, file, rate_hz=rate_hz, time=time, resample_hz=resample_hz)
+        channel = recording.channel(selector)
+        if channel.is_time:
+            raise ChannelError(f"'{channel.path}' holds the time, and no motion", file=file, code="time")
+        own = channel.time or OwnTime(recording.rate_source, recording.rate_hz, recording.start_s)
+        if own.rate_hz is None:
+            why = own.problem or recording.rate_source
+            raise RecordingError(f"no sampling rate: {why}", file=file, advice="give {rate_hz} or {time}")
+        counts, first_ns = _counts_from(contents, recording, given=rate_hz is not None)
+        from_ns = first_ns if not sides else from_ns
+        start = (first_ns - from_ns) / 1e9
+        label = f"{Path(file).name}:{channel.name}"
+        sides.append((replace(channel, path=label, time=replace(own, start_s=own.start_s + start)), counts, recording))
+    (asked, asked_from, first), (answered, answered_from, second) = sides
+    file = f"{target[0]} and {measured[0]}"
+    notes = [*first.notes, *(note for note in second.notes if note not in first.notes)]
+    notes = [note for note in notes if getattr(note, "code", "") != "own_times"]
+    both = Recording(file, first.format, (asked, answered), None, "two files", 0.0, tuple(notes))
+    if fill:
+        both = both.filled(fill)
+    if align:
+        both = _aligned(both)
+    elif "" in (asked_from, answered_from) or asked_from != answered_from:
+        counted = ((target[0], asked_from), (measured[0], answered_from))
+        told = " and ".join(f"{name} {counts or 'has no time column'}" for name, counts in counted)
+        raise RecordingError(
+            f"the two files have no clock in common: {told}",
+            file=file,
+            code="no_common_clock",
+            advice="{align} lays measured where it resembles target most; the delay then says nothing",
+        )
+    elif asked_from == _SECONDS:
+        cause = "if both files count their time from one instant"
+        words = f"the times of both files are taken to count from one instant, which they do not say ({file})"
+        both = replace(both, notes=(*both.notes, Said(words, "clocks_assumed", (), cause)))
+    pair = ("#0", "#1")
+    both = on_one_clock(both, pair)
+    both = _converted(_in_units(both, left_units, pair).scaled(scale or {}), *pair)
+    if start_s is not None or end_s is not None:
+        both = both.cut(start_s, end_s)
+    assert both.rate_hz is not None
+    return ChosenPairs(both, both.rate_hz, [pair], None)
+
+
+_SECONDS = "counts seconds"
+
+
+def _counts_from(contents: Contents, recording: Recording, *, given: bool) -> tuple[str, int]:
+    """From when a file counts its time, in words ("" if it has none), and its first entry in ns where that is a date."""
+    columns = [] if given else time_columns(contents, None, recording.file)
+    if any(not column.is_clock for column in columns):
+        return ("counts from 1970" if recording.start_s > _YEAR_S else _SECONDS), 0
+    first = contents.clocks[0].first_ns if columns else None
+    if first is not None:
+        return ("has dates" if abs(first) > 1e9 * _YEAR_S else "has times of day"), first
+    if any(one.start_s is not None for one in contents.series):
+        return _SECONDS, 0
+    return "", 0
+
+
+def _aligned(recording: Recording) -> Recording:
+    """Two channels laid where they resemble each other most, to a sample of the slower one."""
+    target, measured = recording.channels
+    assert target.time is not None
+    assert measured.time is not None
+    hz = min(float(channel.time.rate_hz or 0) for channel in (target, measured) if channel.time is not None)
+    x, y = (_at(channel, hz) for channel in (target, measured))
+    n = 1 << (len(x) + len(y)).bit_length()
+    product = np.fft.irfft(np.fft.rfft(y, n) * np.conj(np.fft.rfft(x, n)), n)
+    lag = int(product.argmax())
+    likeness = float(product[lag] / (np.linalg.norm(x) * np.linalg.norm(y)))
+    lag -= n if lag > n // 2 else 0
+    if not likeness >= _LIKE:
+        raise RecordingError(
+            f"the two channels do not resemble each other (correlation {likeness:.2f}, expected {_LIKE:g} or more)",
+            file=recording.file,
+            code="not_alike",
+        )
+    moved = replace(measured, time=replace(measured.time, start_s=target.time.start_s - lag / hz))
+    cause = "with both files aligned by correlation, so that the delay says nothing"
+    words = f"the two files were aligned by correlation ({likeness:.3f}), as asked for: the delay says nothing of the actuator"
+    notes = (*recording.notes, Said(words, "clocks_aligned", [lag / hz], cause))
+    return replace(recording, channels=(target, moved), notes=notes)
+
+
+def _at(channel: Channel, hz: float) -> NDArray[np.float64]:
+    """A channel at another rate, roughly, less its mean; missing samples are at the mean."""
+    assert channel.time is not None
+    assert channel.time.rate_hz is not None
+    at = np.arange(int(len(channel.values) * hz / channel.time.rate_hz)) * channel.time.rate_hz / hz
+    values = np.interp(at, np.arange(len(channel.values)), channel.values)
+    values = values - np.nanmean(values)
+    return np.where(np.isfinite(values), values, 0.0)
+
+
+# More than a year from zero is no time since a test began.
+_YEAR_S = 3.2e7
+# What two channels' correlation must be to be aligned by it.
+_LIKE = 0.8
 
 
 def of_time(

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 _ALIKE = 0.01
 # A shift this near to a whole number of samples is one, in samples.
 _WHOLE = 1e-6
-# Two clocks that are further apart than this, in samples, are two.
+# What two clocks are apart is told from this share of a sample on.
 _APART = 1e-3
 # Words of time, which do not say whose time it is.
 _OF_TIME = {"t", "time", "times", "stamp", "timestamp", "x", "value", "values", "s", "sec", "ms", "zeit", "temps"}
@@ -205,9 +205,11 @@ def _of_column(column: TimeColumn, rate: Rate | None) -> OwnTime:
     verdict = column.examine()
     if not isinstance(verdict, Uniform):
         return OwnTime(column.what, None, 0.0, problem=f"{column.what} {verdict.problem}")
+    # Only rounding leaves open what the rate is.
+    allowed = (verdict.low_hz, verdict.high_hz) if verdict.rounded else (math.nan, math.nan)
     if rate is not None and rate.hz is not None and abs(rate.hz / verdict.rate_hz - 1) < _ALIKE:
-        return OwnTime(rate.source, rate.hz, verdict.origin_s, verdict.low_hz, verdict.high_hz)
-    return OwnTime(column.what, verdict.rate_hz, verdict.origin_s, verdict.low_hz, verdict.high_hz)
+        return OwnTime(rate.source, rate.hz, verdict.origin_s, *allowed)
+    return OwnTime(column.what, verdict.rate_hz, verdict.origin_s, *allowed)
 
 
 def _same(a: OwnTime, b: OwnTime) -> bool:
@@ -216,7 +218,13 @@ def _same(a: OwnTime, b: OwnTime) -> bool:
         return a == b
     if a.rate_hz is None or b.rate_hz is None:
         return a.rate_hz is b.rate_hz and a.start_s == b.start_s
-    return _one_rate(a, b) and abs(a.start_s - b.start_s) * a.rate_hz < _WHOLE
+    return _one_rate(a, b) and abs(a.start_s - b.start_s) * a.rate_hz < _whole(a, b)
+
+
+def _whole(a: OwnTime, b: OwnTime) -> float:
+    """How near to a whole number of samples a shift is one: times far from zero are known to round-off only."""
+    far_s = max(abs(a.start_s), abs(b.start_s))
+    return max(_WHOLE, 4 * float(np.finfo(float).eps) * far_s * max(a.rate_hz or 0.0, b.rate_hz or 0.0))
 
 
 def _one_rate(a: OwnTime, b: OwnTime) -> bool:
@@ -245,8 +253,9 @@ def on_one_clock(recording: Recording, selectors: Sequence[str]) -> Recording:
     clock, hz = times[at], rates[at]
     begins = max(time.start_s for time in times)
     ends = min(t.start_s + (len(c.values) - 1) / f for t, c, f in zip(times, chosen, rates, strict=True))
-    first = math.ceil((begins - clock.start_s) * hz - _WHOLE)
-    last = math.floor((ends - clock.start_s) * hz + _WHOLE)
+    near = max(_whole(clock, time) for time in times)
+    first = math.ceil((begins - clock.start_s) * hz - near)
+    last = math.floor((ends - clock.start_s) * hz + near)
     if last - first < 1:
         listed = ", ".join(
             f"'{c.name}' {t.start_s:.10g} to {t.start_s + (len(c.values) - 1) / f:.10g} s"
@@ -291,7 +300,7 @@ def _moved(
     assert clock.rate_hz is not None
     offset = (clock.start_s - time.start_s) * time.rate_hz
     first = offset + samples[0] * time.rate_hz / clock.rate_hz
-    if _one_rate(time, clock) and abs(offset - round(offset)) <= _WHOLE:
+    if _one_rate(time, clock) and abs(offset - round(offset)) <= _whole(time, clock):
         begin = samples[0] + round(offset)
         return values[begin : begin + len(samples)].copy(), "shifted" if round(offset) else ""
     step = 1.0 if _one_rate(time, clock) else time.rate_hz / clock.rate_hz
@@ -317,14 +326,14 @@ def _told(channel: Channel, time: OwnTime, other: Channel, clock: OwnTime, how: 
     assert time.rate_hz is not None
     assert clock.rate_hz is not None
     late_s = time.start_s - clock.start_s
-    begins = f"begins {1e3 * abs(late_s):.10g} ms {'after' if late_s > 0 else 'before'} '{other.name}'"
-    if abs(late_s) * clock.rate_hz <= _WHOLE:
+    begins = f"begins {1e3 * abs(late_s):.7g} ms {'after' if late_s > 0 else 'before'} '{other.name}'"
+    if abs(late_s) * clock.rate_hz <= _whole(time, clock):
         begins = f"begins with '{other.name}'"
     ratio = 1.0 if _one_rate(time, clock) else time.rate_hz / clock.rate_hz
     notes = []
     if abs(ratio - 1) > _ALIKE:
         begins += f" and has {time.rate_hz:.10g} Hz in place of {clock.rate_hz:.10g} Hz"
-    elif ratio != 1:
+    elif abs(ratio - 1) * len(channel.values) > _APART:
         ppm = 1e6 * (ratio - 1)
         words = (
             f"by their stamps the clock of '{channel.name}' runs {abs(ppm):.3g} ppm {'faster' if ppm > 0 else 'slower'} "

@@ -55,6 +55,7 @@ class _Named:
     rest: tuple[str, ...]
 
 
+@np.errstate(all="ignore")  # infinite samples are told where they matter
 def propose_pair(recording: Recording) -> tuple[list[tuple[str, str]], str]:
     """Likely (target, measured) channels, one pair per actuator, and one sentence that says why.
 

@@ -260,7 +260,8 @@ def _no_time(contents: Contents) -> str:
     for index, one in enumerate(contents.series):
         unit_s = seconds_in(_unit(one))
         named = _time_named(one, unit_s)
-        if not named and not (contents.nameless and index == 0):
+        hinted = _HINTS.search(one.name) is not None or (contents.nameless and index == 0)
+        if not named and not hinted:
             continue
         sound = one.values[np.isfinite(one.values)]
         if len(sound) < 4:
@@ -283,7 +284,7 @@ def _no_time(contents: Contents) -> str:
         verdict = examine(one.values)
         if isinstance(verdict, Uniform) and abs(verdict.rate_hz - 1) > 1e-6:
             return (
-                f"the file states no sampling rate, and '{one.path}' rises evenly by {1 / verdict.rate_hz:.6g}, but no "
+                f"the file states no sampling rate, and '{one.path}' rises evenly by {np.median(np.diff(one.values)):.6g}, but no "
                 "name or unit says that it is the time"
             )
     return none

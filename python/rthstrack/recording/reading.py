@@ -7,6 +7,8 @@ import os
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from rthstrack.errors import SettingError
 from rthstrack.recording.clocks import clocks_told, own_times, timelines
 from rthstrack.recording.rate import Rate, doubts, ended, settle, time_columns, with_others
@@ -52,6 +54,7 @@ def checked_rates(rate_hz: float | None, resample_hz: float | None) -> None:
         )
 
 
+@np.errstate(all="ignore")  # infinite samples are told where they matter
 def recording_from(
     contents: Contents,
     file: str,

@@ -196,7 +196,7 @@ def frozen(values: NDArray[np.float64]) -> NDArray[np.float64]:
 def _filled(values: NDArray[np.float64], longest: int) -> tuple[NDArray[np.float64], int, int]:
     """The values with short gaps interpolated, how many samples that were, and in how many gaps."""
     missing = ~np.isfinite(values)
-    if not missing.any():
+    if not missing.any() or missing.all():
         return values, 0, 0
     edges = np.flatnonzero(np.diff(np.concatenate([[False], missing, [False]]).astype(np.int8)))
     starts, ends = edges[::2], edges[1::2]

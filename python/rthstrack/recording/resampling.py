@@ -32,10 +32,7 @@ def resample(contents: Contents, file: str, columns: Sequence[TimeColumn], lines
     if not columns:
         raise RecordingError("cannot resample: no time column", file=file, advice="name one: {time}, or give {rate_hz}")
     column = lines.main[0] if lines.main else columns[0]
-    for one in lines.main:
-        if isinstance(one.examine(), Uniform):
-            column = one
-            break
+    column = next((other for other in lines.main if isinstance(other.examine(), Uniform)), column)
     stamps = _checked(column, file)
     origin = float(stamps[0])
     mean_hz = (len(stamps) - 1) / float(stamps[-1] - origin)
@@ -52,7 +49,7 @@ def resample(contents: Contents, file: str, columns: Sequence[TimeColumn], lines
     for i, one in enumerate(contents.series):
         own = lines.of[i]
         own = column if own is None or own in lines.main else own
-        if one.path == column.path and i == column.index or any(c is not None and i == c.index for c in lines.of):
+        if i == column.index or any(c is not None and i == c.index for c in lines.of):
             continue
         if len(one.values) != len(own.stamps):
             left_out.append(one.path)

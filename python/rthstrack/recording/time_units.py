@@ -66,7 +66,7 @@ def counted_in(stamps: NDArray[np.float64], stated_s: float | None) -> CountedIn
         return CountedIn(
             unit_s,
             Said(
-                f"its unit is not stated: taken as {name}, {1 / (step * unit_s):.4g} Hz, for in s it would be {hz:.4g} Hz",
+                f"its unit is not stated: taken as {name}, {1 / (step * unit_s):.4g} Hz, as in s it would be {hz:.4g} Hz",
                 "time_unit_guessed",
                 (unit_s, 1 / (step * unit_s)),
                 f"if the time is in {name}",

@@ -87,8 +87,8 @@ def _own_starts(series: list[Series], preamble: list[str], *, decimal_comma: boo
     texts = [cell.strip().replace(",", ".") if decimal_comma else cell.strip() for cell in cells.get("X0", [])[1:]]
     starts = [_start(text) for text in texts if text]
     times = [_time_of_day(cell) for cell in cells.get("Time", [])[1:] if cell.strip()]
-    if len(times) == len(starts) and None not in times:
-        starts = [start + time - min(map(float, times)) for start, time in zip(starts, times, strict=True)]  # type: ignore[operator, type-var, arg-type]
+    if len(times) == len(starts) and not any(map(math.isnan, times)):
+        starts = [start + time - min(times) for start, time in zip(starts, times, strict=True)]
     if kind not in (["no"], ["one"]) or len(set(starts)) < 2 or any(math.isnan(start) for start in starts):
         return series
     first = 1 if kind == ["one"] else 0
@@ -103,9 +103,9 @@ def _start(text: str) -> float:
         return math.nan
 
 
-def _time_of_day(text: str) -> float | None:
+def _time_of_day(text: str) -> float:
     found = re.fullmatch(r"\s*(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)\s*", text)
-    return 3600 * int(found[1]) + 60 * int(found[2]) + float(found[3].replace(",", ".")) if found else None
+    return 3600 * int(found[1]) + 60 * int(found[2]) + float(found[3].replace(",", ".")) if found else math.nan
 
 
 def seconds_since_first(stamps: NDArray[np.int64], *, dated: bool) -> NDArray[np.float64]:
