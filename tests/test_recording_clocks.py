@@ -9,10 +9,10 @@ import h5py
 import numpy as np
 import pytest
 import scipy.io
-from field_motion import GAIN, measured, table, target
 from nptdms import ChannelObject, TdmsWriter
 
 import rthstrack
+from field_motion import GAIN, measured, table, target
 from rthstrack.errors import RecordingError
 from rthstrack.recording import on_one_clock, read_recording
 from rthstrack.recording.chosen import read_chosen, read_two
@@ -220,7 +220,7 @@ def test_two_clocks_of_the_same_samples_are_one_and_the_other_is_told(tmp_path: 
 
 def test_channels_without_a_time_in_common_are_refused(tmp_path: Path) -> None:
     path = table(tmp_path / "a.csv", ["Time", "target", "Time", "measured"], [T, target(T), T + 100, measured(T)])
-    with pytest.raises(RecordingError, match="the channels have no time in common: 'target' 0 to 5.99 s") as caught:
+    with pytest.raises(RecordingError, match=r"the channels have no time in common: 'target' 0 to 5\.99 s") as caught:
         read_chosen(path)
     assert caught.value.code == "no_common_time"
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from field_motion import GAIN, measured, table, target
 
+from field_motion import GAIN, measured, table, target
 from rthstrack.cli import main
 from rthstrack.errors import ChannelError
 from rthstrack.recording import Channel, Recording, propose_pair
@@ -23,7 +23,7 @@ CASES = Path(__file__).resolve().parents[2] / "shared" / "cases"
 
 
 def recording_of(*names: str, rate_hz: float | None = 100.0, **values: NDArray[np.float64]) -> Recording:
-    """A recording with channels of these names, each its own noise unless `values` has it by place (`c0`, `c1`, ...)."""
+    """A recording with channels of these names, each its own noise unless `values` has it (`c0`, `c1`, ...)."""
     rng = np.random.default_rng(1)
     units = units_from_names(list(names))
     channels = [
@@ -93,9 +93,9 @@ def test_what_fits_twice_or_not_at_all_is_asked(names: tuple[str, ...], said: st
 
 def test_who_leads_does_not_decide_which_is_target() -> None:
     late, early = measured(T), measured(T, -0.006)
-    with pytest.raises(ChannelError, match="'a' and 'b' move alike .* but which of them is target cannot be told"):
+    with pytest.raises(ChannelError, match=r"'a' and 'b' move alike .* but which is target cannot be told"):
         propose_pair(recording_of("a", "b", c0=target(T), c1=early))
-    with pytest.raises(ChannelError, match="which of them is target cannot be told"):
+    with pytest.raises(ChannelError, match="which is target cannot be told"):
         propose_pair(recording_of("a", "b", c0=late, c1=target(T)))
     # Behind it in the file and late.
     pairs, why = propose_pair(recording_of("a", "b", c0=target(T), c1=late))

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from field_motion import GAIN, measured, table, target
 
+from field_motion import GAIN, measured, table, target
 from rthstrack.cli import main
 from rthstrack.errors import RecordingError, SettingError
 from rthstrack.recording.chosen import read_chosen
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 N = 600
-I = np.arange(N)  # noqa: E741
+I = np.arange(N)
 T = I / 100
 
 
@@ -141,7 +141,7 @@ def test_a_channel_is_found_without_its_unit_or_with_it_in_another_form(tmp_path
         assert recording[selector].name == "target (mm)"
         assert recording[selector].unit == "mm"
     assert recording["measured"].name == "measured_mm"
-    with pytest.raises(RecordingError, match="no channel 'target \\[kN\\]'"):
+    with pytest.raises(RecordingError, match=r"no channel 'target \[kN\]'"):
         recording["target [kN]"]
     both = read_chosen(lengths(tmp_path, ["disp (mm)", "disp (kN)"], (1, 1)), targets=["#1"], measured=["#2"]).recording
     with pytest.raises(RecordingError, match="'disp' names 2 channels"):
@@ -177,7 +177,7 @@ def test_units_are_given_for_channels_that_state_none(tmp_path: Path) -> None:
     path = lengths(tmp_path, ["target", "measured"], (1, 1e-3))
     recording = read_chosen(path, units={"target": "mm", "measured": "m"}).recording
     assert recording["measured"].values == pytest.approx(measured(T), rel=1e-12, abs=1e-15)
-    with pytest.raises(SettingError, match="expected a unit .* found 'furlong'"):
+    with pytest.raises(SettingError, match=r"expected a unit .* found 'furlong'"):
         read_chosen(path, units={"": "furlong"})
 
 

@@ -54,8 +54,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "Exit status: 0 everything was evaluated, 1 some file failed, 2 misuse, 3 a limit was exceeded.",
     )
     parser.add_argument(
-        "files", nargs="*", metavar="FILE", help=f"recorded test ({', '.join(FORMAT_NAMES)}), or a folder of them; none "
-        "where --target and --measured are each FILE:CHANNEL"
+        "files", nargs="*", metavar="FILE", help=f"recorded test ({', '.join(FORMAT_NAMES)}), or a folder of them; "
+        "none where --target and --measured are each FILE:CHANNEL"
     )  # fmt: skip
     signals = add_signals(parser, "signals (a channel is named by name, path or #index)")
     signals.add_argument(

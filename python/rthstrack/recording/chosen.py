@@ -112,9 +112,10 @@ def read_two(
     """
     checked_rates(rate_hz, resample_hz)
     sides: list[tuple[Channel, str, Recording]] = []
-    from_ns = 0
+    from_ns, units, scale = 0, dict(units or {}), dict(scale or {})
     for file, selector in (target, measured):
-        contents, left_units, left_scale = of_time(read_contents(file), time, units or {}, {}, file)
+        contents = read_contents(file)
+        contents, units, scale = of_time(contents, time, units, scale, file, lenient=True)
         recording = recording_from(contents, file, rate_hz=rate_hz, time=time, resample_hz=resample_hz)
         channel = recording.channel(selector)
         if channel.is_time:
@@ -152,7 +153,7 @@ def read_two(
         both = replace(both, notes=(*both.notes, Said(words, "clocks_assumed", (), cause)))
     pair = ("#0", "#1")
     both = on_one_clock(both, pair)
-    both = _converted(_in_units(both, left_units, pair).scaled(scale or {}), *pair)
+    both = _converted(_in_units(both, units, pair).scaled(scale), *pair)
     if start_s is not None or end_s is not None:
         both = both.cut(start_s, end_s)
     assert both.rate_hz is not None
@@ -163,7 +164,7 @@ _SECONDS = "counts seconds"
 
 
 def _counts_from(contents: Contents, recording: Recording, *, given: bool) -> tuple[str, int]:
-    """From when a file counts its time, in words ("" if it has none), and its first entry in ns where that is a date."""
+    """From when a file counts its time, in words ("" if it has none), and its first entry in ns if that is a date."""
     columns = [] if given else time_columns(contents, None, recording.file)
     if any(not column.is_clock for column in columns):
         return ("counts from 1970" if recording.start_s > _YEAR_S else _SECONDS), 0
@@ -195,7 +196,7 @@ def _aligned(recording: Recording) -> Recording:
         )
     moved = replace(measured, time=replace(measured.time, start_s=target.time.start_s - lag / hz))
     cause = "with both files aligned by correlation, so that the delay says nothing"
-    words = f"the two files were aligned by correlation ({likeness:.3f}), as asked for: the delay says nothing of the actuator"
+    words = f"the two files were aligned by correlation ({likeness:.3f}), as asked for: the delay says nothing"
     notes = (*recording.notes, Said(words, "clocks_aligned", [lag / hz], cause))
     return replace(recording, channels=(target, moved), notes=notes)
 
@@ -217,9 +218,18 @@ _LIKE = 0.8
 
 
 def of_time(
-    contents: Contents, time: str | None, units: Mapping[str, str], scale: Mapping[str, float], file: str
+    contents: Contents,
+    time: str | None,
+    units: Mapping[str, str],
+    scale: Mapping[str, float],
+    file: str,
+    *,
+    lenient: bool = False,
 ) -> tuple[Contents, dict[str, str], dict[str, float]]:
-    """The contents with what is said of columns of time done, and the units and factors that are left to do."""
+    """The contents with what is said of columns of time done, and the units and factors that are left to do.
+
+    lenient: a channel that is not there is left, too.
+    """
     for unit in units.values():
         if not is_unit(unit):
             raise SettingError(f"unit: expected a unit (mm, m, in, kN, V, ms, ...), found '{unit}'")
@@ -229,11 +239,20 @@ def of_time(
     if not (any(units) or scale):
         return contents, left_units, left_scale
     places = {column.index for column in time_columns(contents, time, file)}
+
+    def place(selector: str) -> int:
+        try:
+            return select(selector, names, file)
+        except ChannelError:
+            if lenient:
+                return -1
+            raise
+
     for selector in [one for one in units if one]:
-        if (at := select(selector, names, file)) in places:
+        if (at := place(selector)) in places:
             series[at] = replace(series[at], unit=left_units.pop(selector))
     for selector, factor in scale.items():
-        if (at := select(selector, names, file)) in places:
+        if (at := place(selector)) in places:
             del left_scale[selector]
             series[at] = replace(series[at], unit="s", values=series[at].values * factor)
             notes.append(Said(f"time '{series[at].path}' scaled by {factor:g}, to seconds", "scaled", [factor]))

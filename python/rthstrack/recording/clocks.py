@@ -335,10 +335,8 @@ def _told(channel: Channel, time: OwnTime, other: Channel, clock: OwnTime, how: 
         begins += f" and has {time.rate_hz:.10g} Hz in place of {clock.rate_hz:.10g} Hz"
     elif abs(ratio - 1) * len(channel.values) > _APART:
         ppm = 1e6 * (ratio - 1)
-        words = (
-            f"by their stamps the clock of '{channel.name}' runs {abs(ppm):.3g} ppm {'faster' if ppm > 0 else 'slower'} "
-            f"than that of '{other.name}'"
-        )
+        how_so = "faster" if ppm > 0 else "slower"
+        words = f"by their stamps '{channel.name}' has a clock {abs(ppm):.3g} ppm {how_so} than '{other.name}'"
         notes.append(Said(words, "clock_rates", [ratio - 1]))
     n = round(abs(late_s) * clock.rate_hz)
     done = f"shifted by {n} sample{'s' if n != 1 else ''}" if how == "shifted" else "interpolated (cubic)"

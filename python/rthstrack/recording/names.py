@@ -11,31 +11,42 @@ from typing import NamedTuple
 _ROLES = {
     "target": (
         "target targ tgt calculated calc calculada desired des xt objetivo objectif ziel 目標 目标 期望 목표 цель",
-        "reference ref setpoint sp demand dmd soll sollwert consigne consigna referencia riferimento référence rampe "
-        "設定 设定 給定 给定 задание заданное заданный задано уставка 설정",
-        "command cmd cmnd commanded dcmd xc comando comandado comandada comandato commande commandé commandée befehl kommando stellwert 命令 指令 команда 명령",
+        "reference ref setpoint sp demand dmd soll sollwert consigne consigna referencia riferimento "
+        "référence rampe 設定 设定 給定 给定 задание заданное заданный задано уставка 설정",
+        "command cmd cmnd commanded dcmd xc comando comandado comandada comandato commande commandé "
+        "commandée befehl kommando stellwert 命令 指令 команда 명령",
     ),
     "measured": (
-        "measured meas measure msd mes xm ist istwert mesure mesuré mesurée mesures medido medida medição misurato "
-        "misurata misura gemessen messwert 計測 計測値 测量 測量 测定 測定 实测 実測 實測 измерено измеренное измеренный "
-        "измерение 측정 계측",
-        "feedback fbk fdbk fb actual act achieved lvdt encoder temposonic pv real réel réelle reel effettivo effettiva "
-        "retour retroalimentacion rückmeldung 反馈 反饋 フィードバック 实际 實際 実際 факт обратная 실제 피드백",
+        "measured meas measure msd mes xm ist istwert mesure mesuré mesurée mesures medido medida medição "
+        "misurato misurata misura gemessen messwert 計測 計測値 测量 測量 测定 測定 实测 実測 實測 измерено "
+        "измеренное измеренный измерение 측정 계측",
+        "feedback fbk fdbk fb actual act achieved lvdt encoder temposonic pv real réel réelle reel "
+        "effettivo effettiva retour retroalimentacion rückmeldung 反馈 反饋 フィードバック 实际 實際 実際 "
+        "факт обратная 실제 피드백",
         "response resp sensor réponse respuesta risposta antwort 応答 响应 響應 отклик 응답",
     ),
 }
 _QUANTITIES = {
-    "displacement": "disp displ displacement displacements pos position stroke lvdt encoder temposonic xt xm xc dcmd weg "
-    "hub verschiebung déplacement deplacement course desplazamiento posición posicion spostamento posizione "
-    "deslocamento 位移 変位 變位 位置 ストローク 行程 перемещение положение 변위",
-    "force": "force load frc kraft fuerza loadcell effort charge carga forza carico força 力 荷重 荷载 荷載 сила усилие 하중 힘",
-    "acceleration": "acc accel acceleration ag beschleunigung accélération aceleración accelerazione 加速度 ускорение 가속도",
-    "velocity": "vel velocity geschwindigkeit vitesse velocidad velocità 速度 скорость 속도",
-    "rotation": "rotation rot angle angular drehung winkel",
-    "voltage": "volt voltage current valve spool servo spannung tension voltaje 電圧 电压 電壓 阀 バルブ",
-    "other": "temp temperature pressure strain error err fehler erreur time clock counter sample index trigger event count "
-    "cycle cycles segment status flow temperatur druck pression presión 温度 压力 圧力 誤差 误差 時間 时间 時刻 "
-    "ошибка время 시간 오차",
+    "displacement": (
+        "disp displ displacement displacements pos position stroke lvdt encoder temposonic xt xm xc dcmd "
+        "weg hub verschiebung déplacement deplacement course desplazamiento posición posicion spostamento "
+        "posizione deslocamento 位移 変位 變位 位置 ストローク 行程 перемещение положение 변위"
+    ),
+    "force": (
+        "force load frc kraft fuerza loadcell effort charge carga forza carico força 力 荷重 荷载 荷載 сила "
+        "усилие 하중 힘"
+    ),
+    "acceleration": (
+        "acc accel acceleration ag beschleunigung accélération aceleración accelerazione 加速度 ускорение 가속도"
+    ),
+    "velocity": ("vel velocity geschwindigkeit vitesse velocidad velocità 速度 скорость 속도"),
+    "rotation": ("rotation rot angle angular drehung winkel"),
+    "voltage": ("volt voltage current valve spool servo spannung tension voltaje 電圧 电压 電壓 阀 バルブ"),
+    "other": (
+        "temp temperature pressure strain error err fehler erreur time clock counter sample index trigger "
+        "event count cycle cycles segment status flow temperatur druck pression presión 温度 压力 圧力 誤差 "
+        "误差 時間 时间 時刻 ошибка время 시간 오차"
+    ),
 }
 # x_t and x_m, disp_t and disp_m, ...: a letter behind the quantity.
 _LETTERS = {"t": ("target", 0), "d": ("target", 0), "r": ("target", 1), "c": ("target", 2), "m": ("measured", 0)}

@@ -297,7 +297,7 @@ def _by_likeness(recording: Recording, named: list[_Named]) -> tuple[int, int, s
     by = _which_is_target(a.index, b.index, lag, x, y, {o for _, o in twice})
     if by is None:
         raise ChannelError(
-            f"{nothing}; {names} move alike (correlation {correlation:.3f}), but which of them is target cannot be told",
+            f"{nothing}; {names} move alike (correlation {correlation:.3f}), but which is target cannot be told",
             file=recording.file,
             code="which_is_target",
             advice=_NAME,

@@ -13,7 +13,7 @@ from rthstrack.errors import RecordingError
 from rthstrack.recording.names import FILLERS, role, words
 from rthstrack.recording.readers.stamps import Irregular, Uniform, examine
 from rthstrack.recording.recording import select
-from rthstrack.recording.time_units import CountedIn, counted_in, rounded_step
+from rthstrack.recording.time_units import SECONDS, CountedIn, counted_in, rounded_step
 from rthstrack.said import Said
 from rthstrack.units import seconds_in, split_unit
 
@@ -49,7 +49,7 @@ class TimeColumn:
     unit_s: float
     is_clock: bool = False
     index: float = -1
-    unit: CountedIn = CountedIn(1.0)
+    unit: CountedIn = SECONDS
     nameless: bool = False
     _verdict: list[Uniform | Irregular] = field(default_factory=list, repr=False)
 
@@ -97,7 +97,7 @@ def time_columns(contents: Contents, chosen: str | None, file: str) -> list[Time
 
 
 def _time_named(series: Series, unit_s: float | None) -> str:
-    """How plainly a name says time: "", "loosely" ("Time  1 - default sample rate", but not "time delay"), "plainly"."""
+    """How plainly a name says time: "", "loosely" (as "Time  1 - default sample rate", but not "x_t") or "plainly"."""
     stem, unit = split_unit(re.split(r"[/.]", series.name)[-1])
     stem = re.sub(r"\(.*\)$|\[.*\]$", "", stem).strip(" :_-'\"")
     if (unit or series.unit) is not None and unit_s is None:
@@ -283,10 +283,8 @@ def _no_time(contents: Contents) -> str:
     for one in (one for one in contents.series if _HINTS.search(one.name)):
         verdict = examine(one.values)
         if isinstance(verdict, Uniform) and abs(verdict.rate_hz - 1) > 1e-6:
-            return (
-                f"the file states no sampling rate, and '{one.path}' rises evenly by {np.median(np.diff(one.values)):.6g}, but no "
-                "name or unit says that it is the time"
-            )
+            rises = f"'{one.path}' rises evenly by {np.median(np.diff(one.values)):.6g}"
+            return f"the file states no sampling rate, and {rises}, but no name or unit says that it is the time"
     return none
 
 

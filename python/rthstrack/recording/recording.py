@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class OwnTime:
-    """A channel's own clock: where it comes from, its rate, the time of the first sample; or what is the matter with it.
+    """A channel's own clock: where it comes from, its rate, the time of the first sample; or what is wrong with it.
 
     Its stamps allow the rates `low_hz` to `high_hz`.
     """

@@ -38,6 +38,10 @@ class CountedIn(NamedTuple):
     else_in: str = "ms"
 
 
+#: What a column of time counts unless something else is known.
+SECONDS = CountedIn(1.0)
+
+
 def counted_in(stamps: NDArray[np.float64], stated_s: float | None) -> CountedIn:
     """The unit of a column of stamps, of which the file states one (in seconds), or none."""
     sound = stamps[np.isfinite(stamps)]
@@ -66,7 +70,7 @@ def counted_in(stamps: NDArray[np.float64], stated_s: float | None) -> CountedIn
         return CountedIn(
             unit_s,
             Said(
-                f"its unit is not stated: taken as {name}, {1 / (step * unit_s):.4g} Hz, as in s it would be {hz:.4g} Hz",
+                f"its unit is not stated: taken as {name}, {1 / (step * unit_s):.4g} Hz; in s it would be {hz:.4g} Hz",
                 "time_unit_guessed",
                 (unit_s, 1 / (step * unit_s)),
                 f"if the time is in {name}",
