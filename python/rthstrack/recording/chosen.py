@@ -140,14 +140,14 @@ def read_two(
         both = _aligned(both)
     elif "" in (asked_from, answered_from) or asked_from != answered_from:
         counted = ((target[0], asked_from), (measured[0], answered_from))
-        told = " and ".join(f"{name} {counts or 'has no time column'}" for name, counts in counted)
+        told = " and ".join(f"{name} {_COUNTS[counts]}" for name, counts in counted)
         raise RecordingError(
             f"the two files have no clock in common: {told}",
             file=file,
             code="no_common_clock",
             advice="{align} lays measured where it resembles target most; the delay then says nothing",
         )
-    elif asked_from == _SECONDS:
+    elif asked_from == "seconds":
         cause = "if both files count their time from one instant"
         words = f"the times of both files are taken to count from one instant, which they do not say ({file})"
         both = replace(both, notes=(*both.notes, Said(words, "clocks_assumed", (), cause)))
@@ -160,19 +160,26 @@ def read_two(
     return ChosenPairs(both, both.rate_hz, [pair], None)
 
 
-_SECONDS = "counts seconds"
+#: What a file's time counts from, in words.
+_COUNTS = {
+    "": "has no time column",
+    "seconds": "counts seconds",
+    "epoch": "counts seconds since 1970",
+    "dates": "has dates",
+    "day": "has times of day",
+}
 
 
 def _counts_from(contents: Contents, recording: Recording, *, given: bool) -> tuple[str, int]:
-    """From when a file counts its time, in words ("" if it has none), and its first entry in ns if that is a date."""
+    """From when a file counts its time (a key of `_COUNTS`), and its first entry in ns if that is a date."""
     columns = [] if given else time_columns(contents, None, recording.file)
     if any(not column.is_clock for column in columns):
-        return ("counts from 1970" if recording.start_s > _YEAR_S else _SECONDS), 0
+        return ("epoch" if recording.start_s > _YEAR_S else "seconds"), 0
     first = contents.clocks[0].first_ns if columns else None
     if first is not None:
-        return ("has dates" if abs(first) > 1e9 * _YEAR_S else "has times of day"), first
+        return ("dates" if abs(first) > 1e9 * _YEAR_S else "day"), first
     if any(one.start_s is not None for one in contents.series):
-        return _SECONDS, 0
+        return "seconds", 0
     return "", 0
 
 
