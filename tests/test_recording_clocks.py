@@ -209,6 +209,16 @@ def test_whose_time_it_is_must_be_told_where_nothing_tells(tmp_path: Path) -> No
         read_chosen(path)
     assert caught.value.code == "whose_time"
     assert judged(path, time="t1")[0] == pytest.approx(12, abs=1e-4)
+    assert "time_not_followed" in judged(path, rate_hz=100)[3]
+
+
+def test_a_rate_that_is_given_does_not_take_the_channels_begins_away(tmp_path: Path) -> None:
+    path = SHIFTED["csv, interleaved"](tmp_path)
+    assert judged(path, rate_hz=100)[0] == pytest.approx(62, abs=1e-4)
+    # Stamps that say another rate are not followed at all, and that is told.
+    delay_ms, _, _, codes = judged(path, rate_hz=200)
+    assert delay_ms == pytest.approx(6, abs=1e-4)
+    assert codes.count("rate_not_followed") == 2
 
 
 def test_two_clocks_of_the_same_samples_are_one_and_the_other_is_told(tmp_path: Path) -> None:

@@ -136,6 +136,12 @@ def test_an_exact_copy_is_never_proposed() -> None:
         ((asked, answered),) = propose_pair(recording_of("a", "b", "c", **values))[0]
         assert values[f"c{'abc'.index(asked)}"] is x
         assert values[f"c{'abc'.index(answered)}"] is y
+    # Twice and late: it may be measured that is there twice.
+    with pytest.raises(ChannelError, match="which is target cannot be told"):
+        propose_pair(recording_of("a", "b", "c", c0=x, c1=y, c2=y))
+    inches = recording_of("command (mm)", "feedback (in)", c0=x, c1=x / 25.4)
+    with pytest.raises(ChannelError, match="exact copy"):
+        propose_pair(inches)
     with pytest.raises(ChannelError, match="'b' is an exact copy of 'a'"):
         propose_pair(recording_of("a", "b", c0=x, c1=x))
 

@@ -15,7 +15,7 @@ from rthstrack.errors import ChannelError, RecordingError
 from rthstrack.recording.pairing import propose_pair
 from rthstrack.recording.readers import FORMAT_NAMES, read_contents
 from rthstrack.recording.reading import recording_from
-from rthstrack.recording.recording import Recording
+from rthstrack.recording.recording import OwnTime, Recording
 
 if TYPE_CHECKING:
     import argparse
@@ -82,6 +82,7 @@ def _listing(file: str) -> dict[str, Any]:
                 "path": channel.path,
                 "unit": channel.unit,
                 "n_samples": len(channel.values),
+                **({} if channel.time is None else _own(channel.time)),
                 **_range(channel.values),
             }
             for i, channel in enumerate(recording.channels)
@@ -90,6 +91,11 @@ def _listing(file: str) -> dict[str, Any]:
         "proposal": why,
         "notes": list(recording.notes),
     }
+
+
+def _own(time: OwnTime) -> dict[str, Any]:
+    """A channel's own clock, where a file has several."""
+    return {"rate_hz": time.rate_hz, "start_s": time.start_s, "rate_source": time.source}
 
 
 def _range(values: np.ndarray[Any, np.dtype[np.float64]]) -> dict[str, float | int | None]:

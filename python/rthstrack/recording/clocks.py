@@ -44,8 +44,11 @@ class Timelines:
     notes: tuple[Said, ...] = ()
 
 
-def timelines(contents: Contents, columns: Sequence[TimeColumn], file: str) -> Timelines:
-    """Which of the numeric time columns tells whose time: that of its length, nearest in path, name and order."""
+def timelines(contents: Contents, columns: Sequence[TimeColumn], file: str, *, given: bool = False) -> Timelines:
+    """Which of the time columns tells whose time: that of its length, nearest in path, name and order.
+
+    given: the rate is the user's, so that it need not be known. Else raises RecordingError where it is not.
+    """
     if not columns:
         return Timelines((None,) * len(contents.series), ())
     blocks = _blocks(contents, columns)
@@ -67,7 +70,7 @@ def timelines(contents: Contents, columns: Sequence[TimeColumn], file: str) -> T
         uniform = [column for column in group if isinstance(column.examine(), Uniform)]
         if uniform:
             chosen[group] = uniform[0]
-            notes += _contradictions(uniform, counted, of, file)
+            notes += _contradictions(uniform, of, file, given=given)
     return Timelines(tuple(chosen.get(group) for group in of), main, tuple(notes))
 
 
@@ -119,10 +122,7 @@ def _nearest(
 
 
 def _contradictions(
-    uniform: Sequence[TimeColumn],
-    groups: dict[tuple[TimeColumn, ...], int],
-    of: Sequence[tuple[TimeColumn, ...]],
-    file: str,
+    uniform: Sequence[TimeColumn], of: Sequence[tuple[TimeColumn, ...]], file: str, *, given: bool
 ) -> list[Said]:
     """Time columns side by side that begin at other times: of the same samples, or each of another channel?"""
     first = uniform[0].examine()
@@ -136,7 +136,7 @@ def _contradictions(
             continue
         n_channels = sum(uniform[0] in group for group in of)
         alike = {re.sub(r"[\d_ ]+", "", plain) for plain in (uniform[0].path.casefold(), other.path.casefold())}
-        if len(alike) == 1 and n_channels == len(uniform):
+        if len(alike) == 1 and n_channels == len(uniform) and not given:
             raise RecordingError(
                 f"{uniform[0].what} and {other.what} begin {1e3 * abs(apart_s):.6g} ms apart, and no name tells whose "
                 "time each is",
@@ -172,9 +172,9 @@ def own_times(contents: Contents, lines: Timelines, rate: Rate, *, given: bool) 
         if series.start_s is not None:
             source = stated.source if stated is not None else rate.source
             found.append(OwnTime(source, hz, series.start_s))
-        elif column is not None and not given:
+        elif column is not None and (not given or _agrees(column, rate)):
             if column.index not in seen:
-                seen[column.index] = _of_column(column, rate if column in lines.main else None)
+                seen[column.index] = _of_column(column, rate if given or column in lines.main else None)
             found.append(seen[column.index])
         elif length is not None and len(series.values) != length:
             assert main is not None
@@ -199,6 +199,12 @@ def clocks_told(channels: Sequence[Channel]) -> list[Said]:
     starts = [c.time.start_s for c in channels if c.time is not None and not c.is_time and not c.time.problem]
     words = f"channels have times of their own, beginning up to {1e3 * (max(starts) - min(starts)):.6g} ms apart"
     return [Said(words, "own_times", [max(starts) - min(starts)])] if starts else []
+
+
+def _agrees(column: TimeColumn, rate: Rate) -> bool:
+    """Whether stamps say what the user does, so that they may tell when a channel begins."""
+    verdict = column.examine()
+    return isinstance(verdict, Uniform) and rate.hz is not None and abs(rate.hz / verdict.rate_hz - 1) < _ALIKE
 
 
 def _of_column(column: TimeColumn, rate: Rate | None) -> OwnTime:

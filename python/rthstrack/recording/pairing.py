@@ -13,8 +13,8 @@ from rthstrack.errors import ChannelError, RecordingError
 from rthstrack.recording.clocks import on_one_clock
 from rthstrack.recording.copies import is_copy
 from rthstrack.recording.names import FILLERS, GENERIC, quantities, role, words
+from rthstrack.units import length_factor, split_unit
 from rthstrack.units import quantity as unit_quantity
-from rthstrack.units import split_unit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -172,6 +172,8 @@ def _by_name(named: list[_Named], channels: tuple[Channel, ...], file: str, copi
         measured, said = _without_copies(targets, measured, channels)
         copies += said
         if not measured:
+            measured, _ = _without_copies(targets, _bare(targets, named, channels), channels)
+        if not measured:
             continue
         pairs = _matched(targets, measured)
         if not pairs:
@@ -197,11 +199,17 @@ def _bare(targets: list[_Named], named: list[_Named], channels: tuple[Channel, .
     ]
 
 
+def _same(a: Channel, b: Channel) -> bool:
+    """Whether two channels are copies, perhaps in other units."""
+    factor = length_factor(b.unit, a.unit) or 1.0
+    return is_copy(a.values, b.values if factor == 1 else factor * b.values)
+
+
 def _once(found: list[_Named], channels: tuple[Channel, ...]) -> list[_Named]:
     """Of copies the one with the best word."""
     kept: list[_Named] = []
     for one in sorted(found, key=lambda one: one.rank):
-        if not any(is_copy(channels[k.index].values, channels[one.index].values) for k in kept):
+        if not any(_same(channels[k.index], channels[one.index]) for k in kept):
             kept.append(one)
     return sorted(kept, key=lambda one: one.index)
 
@@ -213,8 +221,7 @@ def _without_copies(
     kept: list[_Named] = []
     said = []
     for one in measured:
-        values = channels[one.index].values
-        of = next((t for t in targets if is_copy(channels[t.index].values, values)), None)
+        of = next((t for t in targets if _same(channels[t.index], channels[one.index])), None)
         if of is None:
             kept.append(one)
         else:
@@ -355,11 +362,19 @@ def _which_is_target(
 ) -> tuple[int, str] | None:
     """Which of two like channels is target, never by who leads alone; None where nothing tells.
 
-    A logged copy is of what was sent, for two sensors never agree. An actuator that follows late loses amplitude, and
-    target stands before measured in a file: where one of these agrees with the lag and neither speaks against it.
+    A logged copy is mostly of what was sent. An actuator that follows late loses amplitude, and target stands before
+    measured in a file: where one of these agrees with the lag, and nothing speaks against it.
     """
+    by_motion = _by_motion(a, b, lag, x, y)
     if (a in copied) != (b in copied):
-        return (a if a in copied else b), "and the other is there twice, as a command that is logged"
+        twice = a if a in copied else b
+        if by_motion is None or by_motion[0] == twice:
+            return twice, "and the other is there twice, as a command that is logged"
+        return None
+    return by_motion
+
+
+def _by_motion(a: int, b: int, lag: int, x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[int, str] | None:
     if lag == 0:
         return a, "and stands behind it in the file"
     # Of the one that is late over the other.

@@ -64,7 +64,7 @@ def recording_from(
     resample_hz: float | None = None,
 ) -> Recording:
     """Settles the sampling rate of a file's contents, as `read_recording` describes."""
-    contents, columns, lines = _lines(contents, time, file)
+    contents, columns, lines = _lines(contents, time, file, given=rate_hz is not None)
     numeric = [column for column in columns if not column.is_clock]
     if resample_hz is not None:
         return resample(contents, file, columns, lines, resample_hz)
@@ -83,11 +83,13 @@ def recording_from(
     return Recording(file, contents.format, channels, rate.hz, rate.source, rate.start_s, notes)
 
 
-def _lines(contents: Contents, time: str | None, file: str) -> tuple[Contents, list[TimeColumn], Timelines]:
+def _lines(
+    contents: Contents, time: str | None, file: str, *, given: bool
+) -> tuple[Contents, list[TimeColumn], Timelines]:
     """Which columns tell whose time; where one ends before the table, it and its channels end there."""
     columns = time_columns(contents, time, file)
     numeric = [column for column in columns if not column.is_clock]
-    lines = timelines(contents, (numeric or columns) if time is None else [], file)
+    lines = timelines(contents, (numeric or columns) if time is None else [], file, given=given)
     ends = {column.index: len(ended(column.stamps)) for column in numeric}
     if time is not None or all(ends[column.index] in (0, len(column.stamps)) for column in numeric):
         return contents, columns, lines
@@ -99,4 +101,4 @@ def _lines(contents: Contents, time: str | None, file: str) -> tuple[Contents, l
     contents = replace(contents, series=tuple(series))
     columns = time_columns(contents, None, file)
     numeric = [column for column in columns if not column.is_clock]
-    return contents, columns, timelines(contents, numeric or columns, file)
+    return contents, columns, timelines(contents, numeric or columns, file, given=given)
