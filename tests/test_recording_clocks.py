@@ -228,6 +228,15 @@ def test_two_clocks_of_the_same_samples_are_one_and_the_other_is_told(tmp_path: 
     assert "time_not_followed" in codes
 
 
+def test_another_kind_of_time_between_the_channels_is_asked_about(tmp_path: Path) -> None:
+    columns = [T, target(T), T + 0.5, measured(T)]
+    path = table(tmp_path / "a.csv", ["Time", "target", "Total Time", "measured"], columns)
+    with pytest.raises(RecordingError, match="may be of the same samples or each of another channel") as caught:
+        read_chosen(path)
+    assert caught.value.code == "whose_time"
+    assert judged(path, time="Time")[0] == pytest.approx(12, abs=1e-4)
+
+
 def test_channels_without_a_time_in_common_are_refused(tmp_path: Path) -> None:
     path = table(tmp_path / "a.csv", ["Time", "target", "Time", "measured"], [T, target(T), T + 100, measured(T)])
     with pytest.raises(RecordingError, match=r"the channels have no time in common: 'target' 0 to 5\.99 s") as caught:

@@ -31,6 +31,8 @@ _ALIKE = 0.01
 _WHOLE = 1e-6
 # What two clocks are apart is told from this share of a sample on.
 _APART = 1e-3
+# Words of a time that a whole table may have beside another.
+_KINDS = {"elapsed", "running", "relative", "test", "total", "run", "record", "simulation", "sim", "cycle", "segment"}
 # Words of time, which do not say whose time it is.
 _OF_TIME = {"t", "time", "times", "stamp", "timestamp", "x", "value", "values", "s", "sec", "ms", "zeit", "temps"}
 
@@ -212,10 +214,11 @@ def _of_column(column: TimeColumn, rate: Rate | None) -> OwnTime:
     if not isinstance(verdict, Uniform):
         return OwnTime(column.what, None, 0.0, problem=f"{column.what} {verdict.problem}")
     # Only rounding leaves open what the rate is.
+    kind = " ".join(word for word in _last(column.path) if word in _KINDS)
     allowed = (verdict.low_hz, verdict.high_hz) if verdict.rounded else (math.nan, math.nan)
     if rate is not None and rate.hz is not None and abs(rate.hz / verdict.rate_hz - 1) < _ALIKE:
-        return OwnTime(rate.source, rate.hz, verdict.origin_s, *allowed)
-    return OwnTime(column.what, verdict.rate_hz, verdict.origin_s, *allowed)
+        return OwnTime(rate.source, rate.hz, verdict.origin_s, *allowed, kind=kind)
+    return OwnTime(column.what, verdict.rate_hz, verdict.origin_s, *allowed, kind=kind)
 
 
 def _same(a: OwnTime, b: OwnTime) -> bool:
@@ -253,6 +256,14 @@ def on_one_clock(recording: Recording, selectors: Sequence[str]) -> Recording:
     if all(channel.time is None for channel in chosen):
         return recording
     times = [_known(recording, channel) for channel in chosen]
+    if len({time.kind for time in times}) > 1:
+        sources = " and ".join(dict.fromkeys(time.source for time in times))
+        raise RecordingError(
+            f"{sources} may be of the same samples or each of another channel",
+            file=recording.file,
+            code="whose_time",
+            advice="choose one for all channels: {time}",
+        )
     rates = [float(time.rate_hz or math.nan) for time in times]
     slowest = int(np.argmin(rates))
     at = slowest if rates[slowest] < (1 - _ALIKE) * rates[0] else 0

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 class OwnTime:
     """A channel's own clock: where it comes from, its rate, the time of the first sample; or what is wrong with it.
 
-    Its stamps allow the rates `low_hz` to `high_hz`.
+    Its stamps allow the rates `low_hz` to `high_hz`. kind: what its name says it counts ("total", "running"), if any.
     """
 
     source: str
@@ -36,6 +36,7 @@ class OwnTime:
     low_hz: float = math.nan
     high_hz: float = math.nan
     problem: str = ""
+    kind: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
