@@ -89,6 +89,18 @@ def test_a_scale_or_a_unit_of_a_time_column_is_followed(tmp_path: Path, name: st
     assert read_chosen(path, scale={selector: 0.0005}).rate_hz == 200
 
 
+def test_a_guess_is_told_of_a_channels_own_time_too(tmp_path: Path) -> None:
+    fast = np.arange(1500) * 4
+    columns = [I * 10, target(T), fast + 50, measured(fast / 1000)]
+    path = table(tmp_path / "a.csv", ["t", "target", "t", "measured"], columns, "%.15g")
+    notes = [coded(note) for note in read_chosen(path).recording.notes]
+    told = [note for note in notes if note.code == "time_unit_guessed"]
+    assert [note.values for note in told] == [(1e-3, pytest.approx(100)), (1e-3, pytest.approx(250))]
+    doubted = table(tmp_path / "b.csv", ["t", "target", "t", "measured"], [T, target(T), I, measured(T)], "%.15g")
+    with pytest.raises(RecordingError, match="counts in ones"):
+        read_chosen(doubted)
+
+
 def test_a_step_that_was_rounded_before_it_was_added_up_is_asked_about(tmp_path: Path) -> None:
     notes = [coded(note) for note in read_chosen(written(tmp_path, "time", I * 0.000977)).recording.notes]
     (note,) = [note for note in notes if note.code == "rounded_step"]

@@ -198,7 +198,7 @@ def _assess(
         words = f"no channels were named: judged target '{asked.name}', measured '{answered.name}' ({proposal})"
         said.insert(0, Said(words, "channels_proposed"))
     said += [note for note in notes if note.code not in _GUESSES]
-    guessed = [note.cause for note in map(coded, recording.notes) if note.code in _GUESSES]
+    guessed = list(dict.fromkeys(note.cause for note in map(coded, recording.notes) if note.code in _GUESSES))
     guessed += [f"but {warning.cause}" for warning in assessment.warnings if warning.code == "copy"]
     verdict = ", ".join([assessment.verdict, *guessed])
     return dataclasses.replace(assessment, warnings=tuple(said), verdict=verdict)

@@ -213,12 +213,15 @@ def _of_column(column: TimeColumn, rate: Rate | None) -> OwnTime:
     verdict = column.examine()
     if not isinstance(verdict, Uniform):
         return OwnTime(column.what, None, 0.0, problem=f"{column.what} {verdict.problem}")
+    if column.unit.doubt and rate is None:
+        return OwnTime(column.what, None, 0.0, problem=f"{column.what} {column.unit.doubt}")
+    said = () if column.unit.said is None else (column.unit_said(),)
     # Only rounding leaves open what the rate is.
     kind = " ".join(word for word in _last(column.path) if word in _KINDS)
     allowed = (verdict.low_hz, verdict.high_hz) if verdict.rounded else (math.nan, math.nan)
     if rate is not None and rate.hz is not None and abs(rate.hz / verdict.rate_hz - 1) < _ALIKE:
-        return OwnTime(rate.source, rate.hz, verdict.origin_s, *allowed, kind=kind)
-    return OwnTime(column.what, verdict.rate_hz, verdict.origin_s, *allowed, kind=kind)
+        return OwnTime(rate.source, rate.hz, verdict.origin_s, *allowed, kind=kind, said=said)
+    return OwnTime(column.what, verdict.rate_hz, verdict.origin_s, *allowed, kind=kind, said=said)
 
 
 def _same(a: OwnTime, b: OwnTime) -> bool:
@@ -282,6 +285,7 @@ def on_one_clock(recording: Recording, selectors: Sequence[str]) -> Recording:
             f"the channels have no time in common: {listed}", file=recording.file, code="no_common_time"
         )
     channels, notes = list(recording.channels), list(recording.notes)
+    notes += [one for one in dict.fromkeys(one for time in times for one in time.said) if one not in notes]
     for place, channel, time in zip(places, chosen, times, strict=True):
         values, how = _moved(channel.values, time, clock, range(first, last + 1))
         channels[place] = replace(channel, values=frozen(values), time=None)

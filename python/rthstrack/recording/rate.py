@@ -59,6 +59,11 @@ class TimeColumn:
             self._verdict.append(examine(self.stamps, self.unit_s))
         return self._verdict[0]
 
+    def unit_said(self) -> Said:
+        """What is to be told of the unit that it counts in, where there is something."""
+        assert self.unit.said is not None
+        return Said(f"{self.what}: {self.unit.said}", self.unit.said.code, self.unit.said.values, self.unit.said.cause)
+
     def rate_of_units(self) -> float:
         """Samples a unit, whatever the unit is; NaN where they are not uniform."""
         verdict = self.examine()
@@ -226,7 +231,8 @@ def with_others(rate: Rate, others: Sequence[TimeColumn], file: str) -> Rate:
         if rate.hz is None or not isinstance(verdict, Uniform) or _agree(verdict, rate.hz):
             continue
         if rate.by_column:
-            return Rate(None, f"{rate.source} says {rate.hz:g} Hz, but {other.what} {verdict.rate_hz:g} Hz")
+            differ = f"{rate.source} says {rate.hz:g} Hz, but {other.what} {verdict.rate_hz:g} Hz"
+            return replace(rate, hz=None, source=differ)
         raise RecordingError(
             f"{rate.source} says {rate.hz:g} Hz, but {other.what} says {verdict.rate_hz:g} Hz",
             file=file,
@@ -247,10 +253,7 @@ def _certain(column: TimeColumn, file: str) -> None:
 
 
 def _unit_told(column: TimeColumn) -> list[Said]:
-    said = column.unit.said
-    if said is None:
-        return []
-    return [Said(f"{column.what}: {said}", said.code, said.values, said.cause)]
+    return [] if column.unit.said is None else [column.unit_said()]
 
 
 def _no_time(contents: Contents) -> str:

@@ -28,6 +28,7 @@ class OwnTime:
     """A channel's own clock: where it comes from, its rate, the time of the first sample; or what is wrong with it.
 
     Its stamps allow the rates `low_hz` to `high_hz`. kind: what its name says it counts ("total", "running"), if any.
+    said: what is to be told wherever it is followed.
     """
 
     source: str
@@ -37,6 +38,7 @@ class OwnTime:
     high_hz: float = math.nan
     problem: str = ""
     kind: str = ""
+    said: tuple[Said, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
