@@ -156,6 +156,7 @@ def test_measured_that_begins_later_is_put_on_the_clock_of_target(tmp_path: Path
 
 
 FASTER: dict[str, Callable[[Path], Path]] = {
+    "csv, without names": lambda p: table(p / "a.csv", None, [T, target(T), FAST[: len(T)], measured(FAST[: len(T)])]),
     "csv, of other length": lambda p: table(
         p / "a.csv", ["Time", "target", "Time", "measured"], [T, target(T), FAST, measured(FAST)]
     ),

@@ -51,13 +51,13 @@ class TimeColumn:
     index: float = -1
     unit: CountedIn = SECONDS
     nameless: bool = False
-    _verdict: list[Uniform | Irregular] = field(default_factory=list, repr=False)
+    verdicts: list[Uniform | Irregular] = field(default_factory=list, repr=False)
 
     def examine(self) -> Uniform | Irregular:
         """Whether its stamps are those of uniform sampling."""
-        if not self._verdict:
-            self._verdict.append(examine(self.stamps, self.unit_s))
-        return self._verdict[0]
+        if not self.verdicts:
+            self.verdicts.append(examine(self.stamps, self.unit_s))
+        return self.verdicts[0]
 
     def unit_said(self) -> Said:
         """What is to be told of the unit that it counts in, where there is something."""
@@ -79,6 +79,8 @@ _TIME_NAMES = re.compile(
 )
 
 
+# So many samples show what rises.
+_GLANCE = 1000
 _TIME_WORDS = {"time", "times", "zeit", "temps", "tiempo", "tempo", "stamp", "timestamp"}
 
 
@@ -148,24 +150,31 @@ def _numeric_time(index: int, series: Series, how: str = "") -> TimeColumn:
 
 def _nameless_times(contents: Contents) -> list[TimeColumn]:
     """Where columns have no names: the first, if it rises evenly in steps that are no count, and others like it."""
-    first = contents.series[0]
-    if len(contents.series) < 2 or len(first.values) < 4:
+    series, found = contents.series, list[TimeColumn]()
+    if len(series) < 2 or len(series[0].values) < 4:
         return []
-    found: list[TimeColumn] = []
-    for index, one in enumerate(contents.series):
+    for index, one in enumerate(series):
+        if not np.all(np.diff(one.values[:_GLANCE]) >= 0):
+            if index == 0:
+                return []
+            continue
         verdict = examine(ended(one.values))
         if isinstance(verdict, Irregular) or abs(verdict.rate_hz - 1) < 1e-6:
             if index == 0:
                 return []
             continue
-        if found and abs(verdict.rate_hz / found[0].rate_of_units() - 1) > _AGREEMENT:
+        # Another one beside it may count anything; one behind a channel, and with one behind it, is their time.
+        alike = found and abs(verdict.rate_hz / found[0].rate_of_units() - 1) <= _AGREEMENT
+        between = found and found[-1].index < index - 1 and index + 1 < len(series)
+        if not (index == 0 or alike or between):
             continue
         unit = counted_in(one.values, seconds_in(_unit(one)))
-        taken = "s" if unit.said is None else "time"
-        what = f"column '{one.path}' (it has no name, but rises evenly: taken as time in {taken})"
-        if taken == "time":
-            what = f"column '{one.path}' (it has no name, but rises evenly: taken as time)"
-        found.append(TimeColumn(what, one.path, one.values, unit.unit_s, index=index, unit=unit, nameless=True))
+        taken = " in s" if unit.said is None else ""
+        what = f"column '{one.path}' (it has no name, but rises evenly: taken as time{taken})"
+        column = TimeColumn(what, one.path, one.values, unit.unit_s, index=index, unit=unit, nameless=True)
+        if unit.unit_s == 1 and not math.isnan(one.values[-1]):
+            column.verdicts.append(verdict)
+        found.append(column)
     return found
 
 
