@@ -271,7 +271,7 @@ def test_a_recorded_file_is_studied_by_its_channels(tmp_path: Path) -> None:
     (named,) = read_pairs(path, targets=["target (mm)"], measured=["other (cm)"], start_s=2, end_s=18)
     assert named.target.size == 3200
     assert not any("no channels were named" in note for note in named.notes)
-    assert any("target is in mm, measured in cm" in note for note in named.notes)
+    assert any("'other (cm)' converted from cm to mm" in note for note in named.notes)
     two = read_pairs(path, targets=["target (mm)"] * 2, measured=["measured (mm)", "other (cm)"])
     assert [pair.name for pair in two] == [f"{path}, actuator 0", f"{path}, actuator 1"]
     with pytest.raises(SettingError, match="one measured for each target"):

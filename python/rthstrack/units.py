@@ -58,6 +58,12 @@ def split_unit(name: str) -> tuple[str, str | None]:
     return name, None
 
 
+def stem_and_unit(names: list[str]) -> list[tuple[str, str | None]]:
+    """Each name without its unit, and the unit; the name whole where it states none."""
+    units = units_from_names(names)
+    return [(split_unit(name)[0], unit) if unit else (name, None) for name, unit in zip(names, units, strict=True)]
+
+
 def units_from_names(names: list[str]) -> list[str | None]:
     """The unit that each name states. `x_m` beside `x_t` or `x_c` is measured beside target, not metres."""
     given = set(names)

@@ -249,6 +249,9 @@ happenings! {
     MalformedCounter {} = "malformed_counter",
         ("malformed: a counter that is no whole number, negative, or beyond what its type counts exactly (2^24 for f32, \
           2^53 for f64)");
+    /// A counter that counts only in the other byte order.
+    OtherByteOrder {} = "other_byte_order",
+        ("malformed: a counter that counts only with its bytes in the other order: is byte_order of the layout right?");
     /// A line that holds no sample, by its beginning.
     MalformedLine { line: String, expected: String } = "malformed_line", ("malformed: {line}: expected {expected}");
     /// The system grants less memory for datagrams that wait than is good.

@@ -266,6 +266,15 @@ impl Layout {
         }
     }
 
+    /// Whether the counter of sample `i` counts only with its bytes in the other order.
+    pub fn counts_in_other_order(&self, datagram: &[u8], i: usize) -> bool {
+        let LayoutConfig { header_bytes, sample_bytes, byte_order, counter, .. } = &self.config;
+        let Some((offset, number)) = counter else { return false };
+        let at = &datagram[header_bytes + i * sample_bytes + offset..];
+        let other = if *byte_order == ByteOrder::Little { ByteOrder::Big } else { ByteOrder::Little };
+        number.counter(at, *byte_order).is_none() && number.counter(at, other).is_some()
+    }
+
     /// Sample `i` of a datagram that has more than `i`. The counter is `Some(0)` where there is none, `None` where it is no count.
     pub fn decode(&self, datagram: &[u8], i: usize, target: &mut [f64], measured: &mut [f64]) -> Option<i64> {
         let LayoutConfig { header_bytes, sample_bytes, byte_order, .. } = self.config;
@@ -297,6 +306,16 @@ mod tests {
         assert_eq!(layout.n_samples(datagram.len()), Some(2));
         assert_eq!(decoded(&layout, &datagram, 0), (Some(7), vec![1.0, 3.0], vec![2.0, 4.0]));
         assert_eq!(decoded(&layout, &datagram, 1), (Some(8), vec![5.0, 7.0], vec![6.0, 8.0]));
+    }
+
+    #[test]
+    fn a_counter_that_counts_only_in_the_other_byte_order_is_known() {
+        let layout = Layout::new(LayoutConfig::doubles(1)).unwrap();
+        let bytes = |order: fn(f64) -> [u8; 8], counter: f64| [counter, 1.0, 2.0].map(order).concat();
+        assert!(layout.counts_in_other_order(&bytes(f64::to_be_bytes, 7.0), 0));
+        assert!(!layout.counts_in_other_order(&bytes(f64::to_le_bytes, 7.0), 0));
+        // No count in either order.
+        assert!(!layout.counts_in_other_order(&bytes(f64::to_be_bytes, 7.5), 0));
     }
 
     #[test]

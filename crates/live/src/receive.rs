@@ -90,6 +90,9 @@ fn reset_asked(control: &UdpSocket) -> bool {
     asked
 }
 
+/// So many samples in the other byte order, and none in this one, are no accident.
+const HOPELESS: u64 = 100;
+
 /// A stream of datagrams.
 pub(crate) struct Receiver {
     pub(crate) socket: UdpSocket,
@@ -173,8 +176,17 @@ impl Receiver {
                 }
                 None => {
                     engine.malformed();
+                    let is_other = self.layout.counts_in_other_order(datagram, i);
                     if reminded.is_due(now_s, 2) {
-                        engine.tell(now_s, Happening::MalformedCounter {}, out);
+                        let what = if is_other { Happening::OtherByteOrder {} } else { Happening::MalformedCounter {} };
+                        engine.tell(now_s, what, out);
+                    }
+                    // A counter of zero is the same in both orders.
+                    if is_other && engine.totals().malformed == HOPELESS && engine.totals().tally.received <= 1 {
+                        engine.fail(format!(
+                            "none of the first {HOPELESS} samples has a counter that counts, unless their bytes are in \
+                             the other order: is byte_order of the layout right?"
+                        ));
                     }
                 }
             }

@@ -196,6 +196,21 @@ fn garbage_beside_good_samples_changes_nothing_and_is_counted() {
 }
 
 #[test]
+fn a_stream_in_the_other_byte_order_ends_the_run_and_says_so() {
+    let live = opened(usual_monitor(), usual_source(), json!({}), json!({})).unwrap();
+    live.start().unwrap();
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    for counter in 0..200 {
+        let sample = [f64::from(counter), 5.0, 5.0].map(f64::to_be_bytes).concat();
+        // A run that has ended listens no more.
+        let _ = socket.send_to(&sample, live.address());
+    }
+    assert!(live.wait(PATIENCE));
+    live.stop();
+    assert!(live.fatal().unwrap().contains("bytes are in the other order"), "{:?}", live.fatal());
+}
+
+#[test]
 fn only_accepted_senders_are_heard() {
     let source = json!({"kind": "udp", "address": "127.0.0.1:0", "senders": ["192.0.2.1"], "check_pace": false});
     let live = opened(usual_monitor(), source, json!({}), json!({})).unwrap();

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 from rthstrack.cli.setting_options import spoken
 from rthstrack.errors import SettingError
 from rthstrack.evaluation.presets import PRESETS
+from rthstrack.units import is_unit
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from rthstrack.errors import RthstrackError
 
@@ -24,6 +25,14 @@ def add_signals(parser: argparse.ArgumentParser, title: str) -> argparse._Argume
     signals.add_argument("--measured", action="append", metavar="M", help="what the sensor says, one for each --target")
     signals.add_argument(
         "--scale", action="append", type=scale, default=[], metavar="CHANNEL=X", help="multiply a channel"
+    )
+    signals.add_argument(
+        "--unit",
+        action="append",
+        type=unit,
+        default=[],
+        metavar="[CHANNEL=]U",
+        help="unit of a channel (time too), or of all that are judged and state none",
     )
     rate = signals.add_mutually_exclusive_group()
     rate.add_argument("--rate", type=positive, metavar="HZ", help="sampling rate, where the file does not say")
@@ -37,6 +46,17 @@ def add_signals(parser: argparse.ArgumentParser, title: str) -> argparse._Argume
     return signals
 
 
+def files_in(paths: Sequence[str]) -> list[str]:
+    """The files named, with those of each folder in its place, in order of their names; an empty folder is itself."""
+    found = []
+    for path in paths:
+        inside = sorted(Path(path).iterdir()) if Path(path).is_dir() else []
+        inside = [one for one in inside if one.is_file() and not one.name.startswith(".")]
+        # LabVIEW's index beside a TDMS file is no recording.
+        found += [str(one) for one in inside if one.suffix != ".tdms_index"] or [path]
+    return found
+
+
 def chosen(args: argparse.Namespace) -> dict[str, Any]:
     """What `add_signals` asks for, as the arguments of `read_chosen`."""
     return {
@@ -45,6 +65,7 @@ def chosen(args: argparse.Namespace) -> dict[str, Any]:
         "rate_hz": args.rate,
         "time": args.time,
         "resample_hz": args.resample,
+        "units": dict(args.unit),
         "scale": dict(args.scale),
         "fill": args.fill,
         "start_s": args.start,
@@ -60,6 +81,8 @@ OPTIONS = {
     "time": "--time CHANNEL",
     "resample_hz": "--resample HZ",
     "fill": "--fill SAMPLES",
+    "unit": "--unit",
+    "align": "--align",
 }
 
 
@@ -145,6 +168,13 @@ def scale(text: str) -> tuple[str, float]:
     if (value := number(factor)) == 0:
         raise argparse.ArgumentTypeError(f"expected a factor other than zero, found '{text}'")
     return channel, value
+
+
+def unit(text: str) -> tuple[str, str]:
+    channel, _, found = text.rpartition("=")
+    if not is_unit(found):
+        raise argparse.ArgumentTypeError(f"expected a unit (mm, m, in, V, ms, ...) or CHANNEL=UNIT, found '{text}'")
+    return channel, found
 
 
 def path(*endings: str) -> Callable[[str], Path]:

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rthstrack.cli.arguments import told
+from rthstrack.cli.arguments import files_in, told
 from rthstrack.cli.commands import COMMANDS
 from rthstrack.errors import ChannelError, RecordingError
 from rthstrack.recording.pairing import propose_pair
 from rthstrack.recording.readers import FORMAT_NAMES, read_contents
 from rthstrack.recording.reading import recording_from
-from rthstrack.recording.recording import Recording
+from rthstrack.recording.recording import OwnTime, Recording
 
 if TYPE_CHECKING:
     import argparse
@@ -30,7 +30,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "units, ranges and missing samples, the sampling rate and where it comes from, and the likely "
         "target/measured pair. Exit status: 0 all files were read, 1 some file could not be read, 2 misuse.",
     )
-    parser.add_argument("files", nargs="+", metavar="FILE", help="file to list")
+    parser.add_argument("files", nargs="+", metavar="FILE", help="file to list, or a folder of files")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
     parser.set_defaults(run=run)
 
@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     """Lists the files; returns the exit status."""
     listed: list[dict[str, Any]] = []
     failures: list[dict[str, str]] = []
-    for file in args.files:
+    for file in files_in(args.files):
         try:
             listed.append(_listing(file))
         except RecordingError as error:
@@ -82,6 +82,7 @@ def _listing(file: str) -> dict[str, Any]:
                 "path": channel.path,
                 "unit": channel.unit,
                 "n_samples": len(channel.values),
+                **({} if channel.time is None else _own(channel.time)),
                 **_range(channel.values),
             }
             for i, channel in enumerate(recording.channels)
@@ -90,6 +91,11 @@ def _listing(file: str) -> dict[str, Any]:
         "proposal": why,
         "notes": list(recording.notes),
     }
+
+
+def _own(time: OwnTime) -> dict[str, Any]:
+    """A channel's own clock, where a file has several."""
+    return {"rate_hz": time.rate_hz, "start_s": time.start_s, "rate_source": time.source}
 
 
 def _range(values: np.ndarray[Any, np.dtype[np.float64]]) -> dict[str, float | int | None]:

@@ -1,5 +1,6 @@
 """Recordings: files to named channels with units and one sampling rate, and which of them are target and measured."""
 
+from rthstrack.recording.clocks import on_one_clock
 from rthstrack.recording.pairing import propose_pair
 from rthstrack.recording.reading import read_recording, recording_from
 from rthstrack.recording.recording import Channel, Recording
@@ -9,6 +10,7 @@ __all__ = [
     "Channel",
     "Recording",
     "length_factor",
+    "on_one_clock",
     "propose_pair",
     "read_recording",
     "recording_from",

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rthstrack.errors import RecordingError
+from rthstrack.recording.names import FILLERS, role, words
 from rthstrack.recording.readers.stamps import Irregular, Uniform, examine
 from rthstrack.recording.recording import select
+from rthstrack.recording.time_units import SECONDS, CountedIn, counted_in, rounded_step
 from rthstrack.said import Said
 from rthstrack.units import seconds_in, split_unit
 
@@ -32,27 +34,54 @@ class Rate:
     source: str
     start_s: float = 0.0
     notes: tuple[str, ...] = ()
+    origin_s: float = 0.0
+    by_column: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimeColumn:
-    """A column that may tell the time: `what` names it in messages; `exact` unless it is a computer's clock."""
+    """A column that may tell the time: `what` names it in messages; `index` is its place among the series,
+    a half before one for a column of dates."""
 
     what: str
     path: str
     stamps: NDArray[np.float64]
     unit_s: float
     is_clock: bool = False
+    index: float = -1
+    unit: CountedIn = SECONDS
+    nameless: bool = False
+    verdicts: list[Uniform | Irregular] = field(default_factory=list, repr=False)
 
     def examine(self) -> Uniform | Irregular:
-        return examine(self.stamps, self.unit_s)
+        """Whether its stamps are those of uniform sampling."""
+        if not self.verdicts:
+            self.verdicts.append(examine(self.stamps, self.unit_s))
+        return self.verdicts[0]
+
+    def unit_said(self) -> Said:
+        """What is to be told of the unit that it counts in, where there is something."""
+        assert self.unit.said is not None
+        return Said(f"{self.what}: {self.unit.said}", self.unit.said.code, self.unit.said.values, self.unit.said.cause)
+
+    def rate_of_units(self) -> float:
+        """Samples a unit, whatever the unit is; NaN where they are not uniform."""
+        verdict = self.examine()
+        return verdict.rate_hz * self.unit_s if isinstance(verdict, Uniform) else math.nan
 
 
+# Names of what may count time, in a unit that nobody knows.
+_HINTS = re.compile(r"tick|clock|count|date|stamp", re.IGNORECASE)
 _TIME_NAMES = re.compile(
     r"t|times?|tout|zeit|messzeit|temps|tiempo|tempo|x[_ ]values?|time[ _-]?stamps?|time[ _-]?(?:axis|vector|base|\d+)|"
     r"(?:elapsed|running|relative|test|total|run|sample|measurement|record|simulation|sim)[ _-]?time",
     re.IGNORECASE,
 )
+
+
+# So many samples show what rises.
+_GLANCE = 1000
+_TIME_WORDS = {"time", "times", "zeit", "temps", "tiempo", "tempo", "stamp", "timestamp"}
 
 
 def time_columns(contents: Contents, chosen: str | None, file: str) -> list[TimeColumn]:
@@ -61,42 +90,105 @@ def time_columns(contents: Contents, chosen: str | None, file: str) -> list[Time
     if chosen is not None:
         at = select(chosen, [(c.name, c.path) for c in series] + [(c.name, c.path) for c in clocks], file)
         if at < len(series):
-            return [_numeric_time(series[at], seconds_in(_unit(series[at])) or 1.0, "--time")]
-        return [_clock_time(clocks[at - len(series)])]
-    lengths = [len(s.values) for s in series]
-    usual = max(lengths, key=lengths.count)
-    found = []
-    for one in series:
-        unit_s = seconds_in(_unit(one))
-        if len(one.values) == usual and _is_time(one, unit_s) and np.isfinite(one.values).any():
-            found.append(_numeric_time(one, unit_s or 1.0))
-    return found + [_clock_time(clock) for clock in clocks if np.isfinite(clock.seconds).any()]
+            return [_numeric_time(at, series[at], "--time")]
+        return _clock_times([clocks[at - len(series)]])
+    found = [_numeric_time(i, one) for i, one in enumerate(series) if _is_time(one, seconds_in(_unit(one)))]
+    found = [column for column in found if np.isfinite(column.stamps).any()]
+    if contents.nameless and not found:
+        found = _nameless_times(contents)
+    places = {column.index for column in found}
+    lengths = {len(one.values) for i, one in enumerate(series) if i not in places}
+    # A column of time goes with channels of its length, if there are any.
+    found = [column for column in found if len(column.stamps) in lengths or not lengths]
+    return found + _clock_times(clocks)
+
+
+def _time_named(series: Series, unit_s: float | None) -> str:
+    """How plainly a name says time: "", "loosely" (as "Time  1 - default sample rate", but not "x_t") or "plainly"."""
+    stem, unit = split_unit(re.split(r"[/.]", series.name)[-1])
+    stem = re.sub(r"\(.*\)$|\[.*\]$", "", stem).strip(" :_-'\"")
+    if (unit or series.unit) is not None and unit_s is None:
+        return ""
+    if _TIME_NAMES.fullmatch(stem):
+        return "plainly" if stem != "T" or unit_s is not None else "loosely"
+    if re.match(r"(time|zeit)\b|(date|datum|fecha)[ _-]?(time|zeit)?$", stem, re.IGNORECASE):
+        return "loosely"
+    # t1, t_target, cmd time, but not x_t.
+    found = words(stem)
+    rest = [word for i, word in enumerate(found) if word not in _TIME_WORDS and not (word == "t" and i == 0)]
+    of_one = all(word.isdigit() or role([word]).name is not None or word in FILLERS for word in rest)
+    return "loosely" if len(rest) < len(found) and of_one else ""
 
 
 def _is_time(series: Series, unit_s: float | None) -> bool:
     """Time by its name; a name that means other things too (T, Time 1) needs a unit of time or rising values."""
-    stem, unit = split_unit(re.split(r"[/.]", series.name)[-1])
-    stem = re.sub(r"\(.*\)$|\[.*\]$", "", stem).strip(" :_-'\"")
-    if (unit or series.unit) is not None and unit_s is None:
-        return False
-    if _TIME_NAMES.fullmatch(stem):
-        return stem != "T" or unit_s is not None or bool(np.all(np.diff(series.values) > 0))
-    # "Time  1 - default sample rate" and the like, but not "time delay".
-    loose = re.match(r"(time|zeit)\b", stem, re.IGNORECASE) is not None
-    return loose and len(series.values) > 1 and bool(np.all(np.diff(series.values) > 0))
+    named = _time_named(series, unit_s)
+    if named != "loosely":
+        return named == "plainly"
+    values = ended(series.values)
+    return len(values) > 1 and bool(np.all(np.diff(values) > 0))
+
+
+def ended(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values up to the last that is a number."""
+    if not len(values) or not math.isnan(values[-1]):
+        return values
+    known = np.flatnonzero(~np.isnan(values))
+    return values[: known[-1] + 1] if known.size else values[:0]
 
 
 def _unit(series: Series) -> str | None:
     return series.unit or split_unit(series.name)[1]
 
 
-def _numeric_time(series: Series, unit_s: float, how: str = "") -> TimeColumn:
+def _numeric_time(index: int, series: Series, how: str = "") -> TimeColumn:
+    """A column of numbers as time, in the unit that it states or that fits it best."""
+    unit = counted_in(series.values, seconds_in(_unit(series)))
     what = f"time column '{series.path}'" + (f" ({how})" if how else "")
-    return TimeColumn(what, series.path, series.values, unit_s)
+    return TimeColumn(what, series.path, series.values, unit.unit_s, index=index, unit=unit)
 
 
-def _clock_time(clock: Clock) -> TimeColumn:
-    return TimeColumn(f"date-time column '{clock.path}'", clock.path, clock.seconds, 1.0, is_clock=True)
+def _nameless_times(contents: Contents) -> list[TimeColumn]:
+    """Where columns have no names: the first, if it rises evenly in steps that are no count, and others like it."""
+    series, found = contents.series, list[TimeColumn]()
+    if len(series) < 2 or len(series[0].values) < 4:
+        return []
+    for index, one in enumerate(series):
+        if not np.all(np.diff(one.values[:_GLANCE]) >= 0):
+            if index == 0:
+                return []
+            continue
+        verdict = examine(ended(one.values))
+        if isinstance(verdict, Irregular) or abs(verdict.rate_hz - 1) < 1e-6:
+            if index == 0:
+                return []
+            continue
+        # Another one beside it may count anything; one behind a channel, and with one behind it, is their time.
+        alike = found and abs(verdict.rate_hz / found[0].rate_of_units() - 1) <= _AGREEMENT
+        between = found and found[-1].index < index - 1 and index + 1 < len(series)
+        if not (index == 0 or alike or between):
+            continue
+        unit = counted_in(one.values, seconds_in(_unit(one)))
+        taken = " in s" if unit.said is None else ""
+        what = f"column '{one.path}' (it has no name, but rises evenly: taken as time{taken})"
+        column = TimeColumn(what, one.path, one.values, unit.unit_s, index=index, unit=unit, nameless=True)
+        if unit.unit_s == 1 and not math.isnan(one.values[-1]):
+            column.verdicts.append(verdict)
+        found.append(column)
+    return found
+
+
+def _clock_times(clocks: Sequence[Clock]) -> list[TimeColumn]:
+    """Columns of dates as time, from the earliest first entry of all."""
+    known = [clock for clock in clocks if np.isfinite(clock.seconds).any()]
+    earliest = min((clock.first_ns for clock in known if clock.first_ns is not None), default=0)
+    found = []
+    for clock in known:
+        late_s = 0.0 if clock.first_ns is None else (clock.first_ns - earliest) / 1e9
+        stamps = clock.seconds + late_s if late_s else clock.seconds
+        what = f"date-time column '{clock.path}'"
+        found.append(TimeColumn(what, clock.path, stamps, 1.0, is_clock=True, index=clock.after - 0.5))
+    return found
 
 
 def settle(contents: Contents, columns: Sequence[TimeColumn], *, chosen: bool, file: str) -> Rate:
@@ -105,18 +197,20 @@ def settle(contents: Contents, columns: Sequence[TimeColumn], *, chosen: bool, f
         verdict = columns[0].examine()
         if isinstance(verdict, Irregular):
             raise RecordingError(f"{columns[0].what} {verdict.problem}", file=file, advice=_hint(verdict))
+        _certain(columns[0], file)
         ignored = [s for s in contents.statements if not _agree(verdict, s.rate_hz)]
-        said = tuple(_not_followed(s.source, s.rate_hz, "named time") for s in ignored)
-        return Rate(verdict.rate_hz, columns[0].what, verdict.start_s, said)
+        said = (*_unit_told(columns[0]), *(_not_followed(s.source, s.rate_hz, "named time") for s in ignored))
+        return Rate(verdict.rate_hz, columns[0].what, verdict.start_s, tuple(said), verdict.origin_s, by_column=True)
     stated = _stated(contents, file)
-    numeric = [column for column in columns if not column.is_clock]
+    named = [column for column in columns if not column.is_clock and not column.nameless]
+    nameless = [column for column in columns if column.nameless]
     clocks = [column for column in columns if column.is_clock]
-    told = _told(numeric, stated, file)
+    told = _told(named, stated, file)
     if stated is not None and stated.hz is None:
         return told if told is not None and told.hz is not None else stated
     rate = stated or told
     if stated is not None and told is not None:
-        rate = replace(stated, start_s=told.start_s, notes=(*stated.notes, *told.notes))
+        rate = replace(stated, start_s=told.start_s, origin_s=told.origin_s, notes=(*stated.notes, *told.notes))
     if rate is not None and rate.hz is None:
         return rate
     notes: list[str] = []
@@ -125,12 +219,85 @@ def settle(contents: Contents, columns: Sequence[TimeColumn], *, chosen: bool, f
         if rate is None:
             if isinstance(verdict, Irregular):
                 raise RecordingError(f"{clock.what} {verdict.problem}", file=file, advice=_hint(verdict))
-            rate = Rate(verdict.rate_hz, clock.what)
+            rate = Rate(verdict.rate_hz, clock.what, origin_s=verdict.origin_s, by_column=True)
         elif rate.hz is not None:
             notes += _compare_clock(rate, clock, verdict, file)
     if rate is not None:
         return replace(rate, notes=(*rate.notes, *notes))
-    return _guessed(contents) or Rate(None, "the file states no sampling rate and has no time column")
+    if nameless:
+        verdict = nameless[0].examine()
+        assert isinstance(verdict, Uniform)
+        _certain(nameless[0], file)
+        told_of = tuple(_unit_told(nameless[0]))
+        return Rate(verdict.rate_hz, nameless[0].what, verdict.start_s, told_of, verdict.origin_s, by_column=True)
+    return Rate(None, _no_time(contents))
+
+
+def with_others(rate: Rate, others: Sequence[TimeColumn], file: str) -> Rate:
+    """The rate, unless channels of the same length have times of their own at another: then each has its own only."""
+    for other in others:
+        verdict = other.examine()
+        if rate.hz is None or not isinstance(verdict, Uniform) or _agree(verdict, rate.hz):
+            continue
+        if rate.by_column:
+            differ = f"{rate.source} says {rate.hz:g} Hz, but {other.what} {verdict.rate_hz:g} Hz"
+            return replace(rate, hz=None, source=differ)
+        raise RecordingError(
+            f"{rate.source} says {rate.hz:g} Hz, but {other.what} says {verdict.rate_hz:g} Hz",
+            file=file,
+            advice="give {rate_hz}",
+        )
+    return rate
+
+
+def _certain(column: TimeColumn, file: str) -> None:
+    """Refuses a column whose unit can only be guessed, or is not what it says."""
+    if column.unit.doubt:
+        raise RecordingError(
+            f"{column.what} {column.unit.doubt}",
+            file=file,
+            code="time_unit",
+            advice=f"give {{rate_hz}}, or {{unit}} '{column.path}={column.unit.else_in}'",
+        )
+
+
+def _unit_told(column: TimeColumn) -> list[Said]:
+    return [] if column.unit.said is None else [column.unit_said()]
+
+
+def _no_time(contents: Contents) -> str:
+    """That nothing tells the rate; a column that nearly does is named, with its defect."""
+    none = "the file states no sampling rate and has no time column"
+    lengths = [len(one.values) for one in contents.series]
+    for index, one in enumerate(contents.series):
+        unit_s = seconds_in(_unit(one))
+        named = _time_named(one, unit_s)
+        hinted = _HINTS.search(one.name) is not None or (contents.nameless and index == 0)
+        if not named and not hinted:
+            continue
+        sound = one.values[np.isfinite(one.values)]
+        if len(sound) < 4:
+            continue
+        steps = np.diff(sound)
+        if not named and (np.count_nonzero(steps > 0) < 0.9 * len(steps) or bool(np.all(steps == 1))):
+            continue
+        if not steps.any():
+            continue
+        verdict = examine(one.values, unit_s or 1.0)
+        if isinstance(verdict, Irregular):
+            return f"the file states no sampling rate, and '{one.path}', which may be the time, {verdict.problem}"
+        if lengths.count(len(one.values)) == 1 and len(lengths) > 1:
+            usual = max(lengths, key=lengths.count)
+            return (
+                f"the file states no sampling rate, and '{one.path}', which may be the time, has {len(one.values)} "
+                f"samples where channels have {usual}"
+            )
+    for one in (one for one in contents.series if _HINTS.search(one.name)):
+        verdict = examine(one.values)
+        if isinstance(verdict, Uniform) and abs(verdict.rate_hz - 1) > 1e-6:
+            rises = f"'{one.path}' rises evenly by {np.median(np.diff(one.values)):.6g}"
+            return f"the file states no sampling rate, and {rises}, but no name or unit says that it is the time"
+    return none
 
 
 def _stated(contents: Contents, file: str) -> Rate | None:
@@ -170,6 +337,8 @@ def _told(columns: Sequence[TimeColumn], stated: Rate | None, file: str) -> Rate
     if not uniform:
         return None
     column, first = uniform[0]
+    if stated is None or stated.hz is None:
+        _certain(column, file)
     if stated is not None and stated.hz is not None:
         for other, verdict in uniform:
             if not _agree(verdict, stated.hz):
@@ -185,13 +354,16 @@ def _told(columns: Sequence[TimeColumn], stated: Rate | None, file: str) -> Rate
                 f"{column.what} says {first.rate_hz:g} Hz, but {other.what} {verdict.rate_hz:g} Hz",
             )
     notes: list[str] = [Said(f"{c.what} {v.problem}; it was not used", "irregular_time") for c, v in irregular]
+    notes += _unit_told(column)
     if first.rounded and first.high_hz - first.low_hz > 2e-3 * first.rate_hz:
         words = (
             f"{column.what} is rounded: any rate from {first.low_hz:.6g} to {first.high_hz:.6g} Hz fits it; "
             "give the rate if you know better"
         )
         notes.append(Said(words, "rounded_time", (first.low_hz, first.high_hz)))
-    return Rate(first.rate_hz, column.what, first.start_s, tuple(notes))
+    elif (stated is None or stated.hz is None) and (said := rounded_step(first.rate_hz)) is not None:
+        notes.append(said)
+    return Rate(first.rate_hz, column.what, first.start_s, tuple(notes), first.origin_s, by_column=True)
 
 
 def _compare_clock(rate: Rate, clock: TimeColumn, verdict: Uniform | Irregular, file: str) -> list[str]:
@@ -208,18 +380,6 @@ def _compare_clock(rate: Rate, clock: TimeColumn, verdict: Uniform | Irregular, 
     raise RecordingError(
         f"{rate.source} says {rate.hz:g} Hz, but {clock.what} says {says:g} Hz", file=file, advice="give {rate_hz}"
     )
-
-
-def _guessed(contents: Contents) -> Rate | None:
-    """The first column where columns have no names, if it rises evenly in steps that are no count."""
-    first = contents.series[0]
-    if not contents.nameless or len(contents.series) < 2 or len(first.values) < 4:
-        return None
-    verdict = examine(first.values)
-    if isinstance(verdict, Irregular) or abs(verdict.rate_hz - 1) < 1e-6:
-        return None
-    source = f"column '{first.path}' (it has no name, but rises evenly: taken as time in s)"
-    return Rate(verdict.rate_hz, source, verdict.start_s)
 
 
 def doubts(contents: Contents, columns: Sequence[TimeColumn], rate_hz: float) -> list[str]:

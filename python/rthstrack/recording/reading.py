@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import math
 import os
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from rthstrack.errors import SettingError
-from rthstrack.recording.rate import Rate, doubts, settle, time_columns
+from rthstrack.recording.clocks import clocks_told, own_times, timelines
+from rthstrack.recording.rate import Rate, doubts, ended, settle, time_columns, with_others
 from rthstrack.recording.readers import read_contents
+from rthstrack.recording.readers.stamps import Uniform
 from rthstrack.recording.recording import Recording, channels_of
 from rthstrack.recording.resampling import resample
 
 if TYPE_CHECKING:
+    from rthstrack.recording.clocks import Timelines
+    from rthstrack.recording.rate import TimeColumn
     from rthstrack.recording.readers.contents import Contents
 
 
@@ -26,12 +33,18 @@ def read_recording(
     """Reads a file of any known format, chosen by its content.
 
     The sampling rate comes from the first of: `rate_hz`; the channel named by `time`; a statement in the file; a time
-    column known by its name; a column of dates or times of day. It may stay None. `resample_hz` interpolates every
-    channel from the time stamps onto a uniform grid (cubic, without a low-pass).
+    column known by its name; a column of dates or times of day. It may stay None. Channels that have a time of their
+    own carry it (`Channel.time`); `on_one_clock` puts some on one. `resample_hz` interpolates every channel from its
+    time stamps onto a uniform grid (cubic, without a low-pass).
     Raises RecordingError if the file cannot be read, if time stamps are not uniform, or if two statements of the rate
     differ by more than 1 %; ChannelError for `time`; SettingError for a rate that is not positive.
     """
-    file = os.fspath(path)
+    checked_rates(rate_hz, resample_hz)
+    return recording_from(read_contents(path), os.fspath(path), rate_hz=rate_hz, time=time, resample_hz=resample_hz)
+
+
+def checked_rates(rate_hz: float | None, resample_hz: float | None) -> None:
+    """Raises SettingError for rates that cannot be, or not together."""
     for what, value in (("rate", rate_hz), ("resample", resample_hz)):
         if value is not None and not (math.isfinite(value) and value > 0):
             raise SettingError(f"{what}: expected a positive number of Hz, found {value:g}")
@@ -39,9 +52,9 @@ def read_recording(
         raise SettingError(
             "rate and resample exclude each other: one ignores the time stamps, the other interpolates them"
         )
-    return recording_from(read_contents(path), file, rate_hz=rate_hz, time=time, resample_hz=resample_hz)
 
 
+@np.errstate(all="ignore")  # infinite samples are told where they matter
 def recording_from(
     contents: Contents,
     file: str,
@@ -51,14 +64,41 @@ def recording_from(
     resample_hz: float | None = None,
 ) -> Recording:
     """Settles the sampling rate of a file's contents, as `read_recording` describes."""
-    columns = time_columns(contents, time, file)
+    contents, columns, lines = _lines(contents, time, file, given=rate_hz is not None)
+    numeric = [column for column in columns if not column.is_clock]
     if resample_hz is not None:
-        return resample(contents, file, columns, resample_hz)
+        return resample(contents, file, columns, lines, resample_hz)
+    main = [*lines.main, *(c for c in columns if c.is_clock and numeric)] if time is None else columns
     if rate_hz is not None:
         rate = Rate(float(rate_hz), "--rate", 0.0, tuple(doubts(contents, columns, rate_hz)))
     else:
-        rate = settle(contents, columns, chosen=time is not None, file=file)
-    channels = channels_of(contents, contents.series)
-    return Recording(
-        file, contents.format, channels, rate.hz, rate.source, rate.start_s, (*contents.notes, *rate.notes)
-    )
+        rate = settle(contents, main, chosen=time is not None, file=file)
+        length = len(lines.main[0].stamps) if lines.main else 0
+        others = {c for c in lines.of if c is not None and c not in lines.main and len(c.stamps) == length}
+        rate = with_others(rate, sorted(others, key=lambda c: c.index), file)
+    times = own_times(contents, lines, rate, given=rate_hz is not None)
+    places = {int(c.index) for c in columns if not c.is_clock and isinstance(c.examine(), Uniform)}
+    channels = channels_of(contents, contents.series, times, places)
+    notes = (*contents.notes, *rate.notes, *lines.notes, *clocks_told(channels))
+    return Recording(file, contents.format, channels, rate.hz, rate.source, rate.start_s, notes)
+
+
+def _lines(
+    contents: Contents, time: str | None, file: str, *, given: bool
+) -> tuple[Contents, list[TimeColumn], Timelines]:
+    """Which columns tell whose time; where one ends before the table, it and its channels end there."""
+    columns = time_columns(contents, time, file)
+    numeric = [column for column in columns if not column.is_clock]
+    lines = timelines(contents, (numeric or columns) if time is None else [], file, given=given)
+    ends = {column.index: len(ended(column.stamps)) for column in numeric}
+    if time is not None or all(ends[column.index] in (0, len(column.stamps)) for column in numeric):
+        return contents, columns, lines
+    series = list(contents.series)
+    for i, own in enumerate(lines.of):
+        last = ends.get(float(i) if own is None else own.index, 0)
+        if 0 < last < len(series[i].values) and len(ended(series[i].values)) <= last:
+            series[i] = replace(series[i], values=series[i].values[:last])
+    contents = replace(contents, series=tuple(series))
+    columns = time_columns(contents, None, file)
+    numeric = [column for column in columns if not column.is_clock]
+    return contents, columns, timelines(contents, numeric or columns, file, given=given)

@@ -13,24 +13,48 @@ import numpy as np
 
 from rthstrack.errors import ChannelError, RecordingError, SettingError
 from rthstrack.said import Said
-from rthstrack.units import units_from_names
+from rthstrack.units import stem_and_unit, units_from_names
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from rthstrack.recording.readers.contents import Contents, Series
 
 
+@dataclass(frozen=True, slots=True)
+class OwnTime:
+    """A channel's own clock: where it comes from, its rate, the time of the first sample; or what is wrong with it.
+
+    Its stamps allow the rates `low_hz` to `high_hz`. kind: what its name says it counts ("total", "running"), if any.
+    said: what is to be told wherever it is followed.
+    """
+
+    source: str
+    rate_hz: float | None
+    start_s: float
+    low_hz: float = math.nan
+    high_hz: float = math.nan
+    problem: str = ""
+    kind: str = ""
+    said: tuple[Said, ...] = ()
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Channel:
-    """One channel: `values` (n_samples,), read-only. `path` is its place in the file; `unit` None if not stated."""
+    """One channel: `values` (n_samples,), read-only. `path` is its place in the file; `unit` None if not stated.
+
+    time: its own clock where a file has several (`on_one_clock`), None where it is the recording's.
+    is_time: it holds the time, and no motion.
+    """
 
     name: str
     path: str
     unit: str | None
     values: NDArray[np.float64] = field(repr=False)
+    time: OwnTime | None = None
+    is_time: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,8 +81,9 @@ class Recording:
     def channel(self, selector: str) -> Channel:
         """The channel that `selector` names.
 
-        By exact name or path, else by either without regard to case and blanks, else `#0`, `#1`, ... in the order of
-        `channels` (as `rthstrack channels` lists them). Raises ChannelError if there is none or more than one.
+        By exact name or path, else by either without regard to case and blanks, else by name without its unit
+        (`target` for `target (mm)`), else `#0`, `#1`, ... in the order of `channels` (as `rthstrack channels` lists
+        them). Raises ChannelError if there is none or more than one.
         """
         return self.channels[select(selector, [(c.name, c.path) for c in self.channels], self.file)]
 
@@ -77,7 +102,7 @@ class Recording:
             if channels[at] is not old:
                 raise SettingError(f"scale: '{selector}' names channel '{old.path}', which is scaled already")
             unit = old.unit if abs(factor) == 1 else None
-            channels[at] = replace(old, unit=unit, values=_frozen(old.values * factor))
+            channels[at] = replace(old, unit=unit, values=frozen(old.values * factor))
             words = f"channel '{old.path}' scaled by {factor:g}" + (f" (was in {old.unit})" if old.unit else "")
             notes.append(Said(words, "scaled", [factor]))
         return replace(self, channels=tuple(channels), notes=tuple(notes))
@@ -114,8 +139,19 @@ class Recording:
             ends_s = longest / self.rate_hz
             words = f"the recording ends at {ends_s:g} s, before the end of the cut at {end_s:g} s"
             notes.append(Said(words, "cut_short", (ends_s, end_s)))
-        channels = tuple(replace(c, values=_frozen(c.values[first:last].copy())) for c in self.channels)
+        channels = tuple(self._cut(channel, first, last) for channel in self.channels)
         return replace(self, channels=channels, start_s=self.start_s + first / self.rate_hz, notes=tuple(notes))
+
+    def _cut(self, channel: Channel, first: int, last: int) -> Channel:
+        """A channel from one sample of the recording's clock to another; one with its own clock at the same times."""
+        time = channel.time
+        if time is not None and time.rate_hz is not None and self.rate_hz is not None:
+            n, early = len(channel.values), self.start_s - time.start_s
+            first, last = (
+                min(max(math.ceil((early + edge / self.rate_hz) * time.rate_hz - 1e-6), 0), n) for edge in (first, last)
+            )
+            time = replace(time, start_s=time.start_s + first / time.rate_hz)
+        return replace(channel, values=frozen(channel.values[first:last].copy()), time=time)
 
     def filled(self, max_gap_samples: int) -> Recording:
         """Gaps of up to `max_gap_samples` NaN or infinite samples replaced by linear interpolation.
@@ -137,14 +173,24 @@ class Recording:
         return replace(self, channels=tuple(channels), notes=tuple(notes), n_filled=MappingProxyType(n_filled))
 
 
-def channels_of(contents: Contents, series: Sequence[Series]) -> tuple[Channel, ...]:
+def channels_of(
+    contents: Contents,
+    series: Sequence[Series],
+    times: Sequence[OwnTime | None] = (),
+    time_places: Collection[int] = (),
+) -> tuple[Channel, ...]:
+    """The series as channels, with their own times if there are any; those at `time_places` hold the time."""
     # Units are read from all names together: what x_m means depends on whether there is an x_t.
     all_names = [s.name for s in contents.series]
     by_name = dict(zip(all_names, units_from_names(all_names), strict=True))
-    return tuple(Channel(s.name, s.path, s.unit or by_name[s.name], _frozen(s.values)) for s in series)
+    own = times or [None] * len(series)
+    return tuple(
+        Channel(s.name, s.path, s.unit or by_name[s.name], frozen(s.values), time, i in time_places)
+        for i, (s, time) in enumerate(zip(series, own, strict=True))
+    )
 
 
-def _frozen(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def frozen(values: NDArray[np.float64]) -> NDArray[np.float64]:
     values = np.ascontiguousarray(values, dtype=np.float64)
     values.setflags(write=False)
     return values
@@ -153,7 +199,7 @@ def _frozen(values: NDArray[np.float64]) -> NDArray[np.float64]:
 def _filled(values: NDArray[np.float64], longest: int) -> tuple[NDArray[np.float64], int, int]:
     """The values with short gaps interpolated, how many samples that were, and in how many gaps."""
     missing = ~np.isfinite(values)
-    if not missing.any():
+    if not missing.any() or missing.all():
         return values, 0, 0
     edges = np.flatnonzero(np.diff(np.concatenate([[False], missing, [False]]).astype(np.int8)))
     starts, ends = edges[::2], edges[1::2]
@@ -165,7 +211,7 @@ def _filled(values: NDArray[np.float64], longest: int) -> tuple[NDArray[np.float
     known = np.flatnonzero(~missing)
     out = values.copy()
     out[gaps] = np.interp(np.flatnonzero(gaps), known, values[known])
-    return _frozen(out), int(np.count_nonzero(gaps)), int(np.count_nonzero(inner))
+    return frozen(out), int(np.count_nonzero(gaps)), int(np.count_nonzero(inner))
 
 
 def select(selector: str, channels: Sequence[tuple[str, str]], file: str) -> int:
@@ -177,6 +223,12 @@ def select(selector: str, channels: Sequence[tuple[str, str]], file: str) -> int
     matches = [i for i, both in enumerate(channels) if selector in both]
     if not matches:
         matches = [i for i, both in enumerate(channels) if loose(selector) in map(loose, both)]
+    if not matches:
+        # target, target [mm] and target_mm are target (mm), where there is but one.
+        ((stem, unit),), fits = stem_and_unit([selector]), []
+        for parts in zip(*(stem_and_unit(list(one)) for one in zip(*channels, strict=True)), strict=True):
+            fits.append(any(loose(s) == loose(stem) and (unit is None or u in (None, unit)) for s, u in parts))
+        matches = [i for i, fit in enumerate(fits) if fit]
     if len(matches) == 1:
         return matches[0]
     if matches:

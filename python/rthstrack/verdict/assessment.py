@@ -22,7 +22,7 @@ from rthstrack.said import failed
 from rthstrack.verdict.argument import argument as argued
 from rthstrack.verdict.difference import differ
 from rthstrack.verdict.display import signal_roles
-from rthstrack.verdict.limits import Limits, exceeded, unchecked
+from rthstrack.verdict.limits import Limits, copy_exceeds, exceeded, unchecked
 from rthstrack.verdict.sentence import reason, sentence, still_in_band, with_cause
 from rthstrack.verdict.warnings import warnings as found_warnings
 
@@ -189,6 +189,7 @@ def assess(
     if without_bad is not tracking:
         variants["bad_samples"] = without_bad
     argument, said = argued(t, tracking, trusted, depends, slopes, variants, warnings, unit, start_s)
+    copy = warnings.get("copy")
     evaluation = dataclasses.asdict(tracking.settings) | _factor_settings(factors)
     evaluation["expected_delay_s"] = of_trusted.expected_delay_s
     return Assessment(
@@ -218,13 +219,13 @@ def assess(
         histories=index_histories(t, m, rate_hz),
         settings=evaluation | {"moving_s": window_s, "hop_s": hop_s} | dict(origin or {}),
         verdict=sentence(tracking, *signal_roles(part)),
-        argument=argument,
+        argument=argument if copy is None else f"no number says anything here: {copy.cause}",
         warnings=(
             *unchecked(tracking, limits),
             *(warning for code, warning in warnings.items() if code != said),
         ),
         limits=limits,
-        exceeded=exceeded(tracking, limits),
+        exceeded=(*copy_exceeds(copy, limits), *exceeded(tracking, limits)),
         factors=factors,
     )
 

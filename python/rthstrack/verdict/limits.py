@@ -33,6 +33,13 @@ def exceeded(tracking: Tracking, limits: Limits) -> tuple[Said, ...]:
     return tuple(found)
 
 
+def copy_exceeds(copy: Said | None, limits: Limits) -> tuple[Said, ...]:
+    """That no limit is passed by a channel that is a copy of target."""
+    if copy is None or (limits.delay_s is None and limits.amplitude is None):
+        return ()
+    return (Said(f"no limit is passed: {copy.cause}", "limit_copy"),)
+
+
 def unchecked(tracking: Tracking, limits: Limits) -> tuple[Said, ...]:
     """That a limit could not be checked, as there is no number to hold against it."""
     if (limits.delay_s is None and limits.amplitude is None) or _undetermined(tracking) is None:

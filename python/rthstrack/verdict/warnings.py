@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rthstrack.evaluation.bad_samples import BadSamples
+from rthstrack.recording.copies import is_copy
 from rthstrack.said import Said
 from rthstrack.units import length_factor
 from rthstrack.verdict.difference import _SAME_DELAY_S
@@ -39,6 +40,8 @@ _TARGET_NOISE = 5e-4
 # Between samples the interpolated noise draws a fit by up to this share of its energy over that of a step.
 _PULL = 0.25
 _ODD_AMPLITUDE = 3.0
+# A thousand or a thousandth, but for so much, is a question of units.
+_THOUSAND = 1.5
 # Spread of the delay over the frequencies that carry the weight, as a share of the delay.
 _DELAY_SPREAD = 0.2
 
@@ -66,6 +69,7 @@ def warnings(
     # Of these channels what is clipped or held is told already.
     told = {bad.channel for bad in _of_one(trusted) if bad.kind in ("clipped", "held")}
     found = (
+        copied(target, measured, names),
         _unlike_units(units, names),
         _wrap(tracking, names),
         _odd_amplitude(tracking if math.isnan(float(trusted.amplitude)) else trusted, units),
@@ -82,6 +86,16 @@ def warnings(
         _quiet(moving, names[0]),
     )
     return {warning.code: warning for warning in found if warning is not None}
+
+
+def copied(
+    target: NDArray[np.float64], measured: NDArray[np.float64], names: tuple[str, str] = ("target", "measured")
+) -> Said | None:
+    """That both channels hold the same samples, which no sensor makes: nothing was measured."""
+    if not is_copy(target, measured):
+        return None
+    cause = f"{names[1]} is an exact copy of {names[0]}, so nothing was measured"
+    return Said(f"{cause}: is the right channel named?", "copy", (), cause)
 
 
 def _unlike_units(units: tuple[str | None, str | None], names: tuple[str, str]) -> Said | None:
@@ -111,9 +125,15 @@ def _wrap(tracking: Tracking, names: tuple[str, str]) -> Said | None:
 
 def _odd_amplitude(tracking: Tracking, units: tuple[str | None, str | None]) -> Said | None:
     amplitude = float(tracking.amplitude)
-    if math.isnan(amplitude) or 1 / _ODD_AMPLITUDE < amplitude < _ODD_AMPLITUDE or units[0] != units[1]:
+    if math.isnan(amplitude) or 1 / _ODD_AMPLITUDE < amplitude < _ODD_AMPLITUDE:
+        return None
+    if None not in units and units[0] != units[1]:
         return None
     words = f"amplitude {amplitude:.3g} is far from 1: are both channels displacements in the same unit? (--scale)"
+    for factor, of, to in ((1e-3, "mm", "m"), (1e3, "m", "mm")):
+        if 1 / _THOUSAND < amplitude / factor < _THOUSAND:
+            words = f"amplitude {amplitude:.3g}: is target in {of} and measured in {to}? "
+            words += f"(--unit CHANNEL={to}, or --scale)"
     return Said(words, "odd_amplitude", [amplitude])
 
 

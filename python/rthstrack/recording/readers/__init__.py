@@ -115,7 +115,10 @@ def read_contents(path: str | os.PathLike[str]) -> Contents:
     except MemoryError as error:
         raise _error(path, "more than the memory holds; the file is damaged or too large") from error
     except Exception as error:
-        raise _error(path, f"damaged, or not as its format demands: {_first_line(error)}") from error
+        said = _first_line(error)
+        # A bare number or word (KeyError: 0) says nothing without what it is.
+        said = said if " " in said else f"{type(error).__name__} {said}"
+        raise _error(path, f"damaged, or not as its format demands: {said}") from error
     notes = _summed([*contents.notes, *(_first_line(w.message) for w in caught)])
     if not contents.series:
         said = "; ".join(notes[:3]) or "nothing of the kind"

@@ -121,15 +121,15 @@ def as_float(values: NDArray[Any]) -> NDArray[np.float64]:
     return np.ascontiguousarray(values, dtype=np.float64)
 
 
-def clock(name: str, values: NDArray[Any]) -> Clock:
-    """A column of datetime64 or timedelta64 as a clock."""
+def clock(name: str, values: NDArray[Any], after: int = 0) -> Clock:
+    """A column of datetime64 or timedelta64 as a clock, behind so many series."""
     ns = values.astype("datetime64[ns]" if values.dtype.kind == "M" else "timedelta64[ns]")
     missing = np.isnat(ns)
     first = ns[~missing][:1]
     seconds = np.full(ns.shape, math.nan)
     if first.size:
         seconds[~missing] = (ns[~missing] - first).astype(np.int64) / 1e9
-    return Clock(name, name, seconds)
+    return Clock(name, name, seconds, int(first[0].astype(np.int64)) if first.size else None, after)
 
 
 def collect(
@@ -148,7 +148,7 @@ def collect(
         if rate is not None:
             stated.append(RateStatement(f"'{name}'", rate))
         elif array.dtype.kind in "Mm" and array.ndim == 1:
-            clocks.append(clock(name, array))
+            clocks.append(clock(name, array, len(series)))
         else:
             series += columns(name, array, unit, said)
     return Contents(form, tuple(series), tuple(clocks), tuple(stated), tuple(said))

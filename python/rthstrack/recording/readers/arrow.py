@@ -67,10 +67,10 @@ def contents_of(form: str, table: Any, notes: list[str]) -> Contents:
     for field, column in zip(table.schema, table.columns, strict=True):
         unit = unit_in(_plain(field.metadata))
         if pa.types.is_timestamp(field.type) or pa.types.is_duration(field.type):
-            clocks.append(clock(field.name, column.to_numpy(zero_copy_only=False)))
+            clocks.append(clock(field.name, column.to_numpy(zero_copy_only=False), len(series)))
         elif pa.types.is_time(field.type):
             nanoseconds = column.cast(pa.time64("ns")).cast(pa.int64()).cast(pa.duration("ns"))
-            clocks.append(clock(field.name, nanoseconds.to_numpy(zero_copy_only=False)))
+            clocks.append(clock(field.name, nanoseconds.to_numpy(zero_copy_only=False), len(series)))
         elif _is_number(field.type):
             values = column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False)
             series.append(Series(field.name, field.name, unit, as_float(np.asarray(values))))

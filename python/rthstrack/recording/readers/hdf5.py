@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import h5py
@@ -9,7 +11,7 @@ import numpy as np
 
 from rthstrack.errors import RecordingError
 from rthstrack.recording.readers.arrays import collect, rate_of, unit_in
-from rthstrack.recording.readers.contents import RateStatement
+from rthstrack.recording.readers.contents import STARTS, RateStatement
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -32,6 +34,7 @@ def read(path: Path) -> Contents:
     entries: list[tuple[str, NDArray[Any], str | None]] = []
     statements: list[RateStatement] = []
     notes: list[str] = []
+    starts: dict[str, float] = {}
 
     def visit(name: str, item: Any) -> None:
         is_dataset = isinstance(item, h5py.Dataset)
@@ -47,12 +50,22 @@ def read(path: Path) -> Contents:
             notes.append(f"'{name}' {'is empty' if item.shape is None else 'holds no numbers'}, no channel")
             return
         check_size(item)
+        start = next((_number(value) for key, value in attributes.items() if key.lower() in STARTS), None)
+        if start is not None:
+            starts[name] = start
         entries.append((name, np.asarray(item[()]), unit_in(attributes)))
 
     with h5py.File(path, "r") as file:
         visit("", file)
         file.visititems(visit)
-    return collect("HDF5", entries, statements, notes)
+    found = collect("HDF5", entries, statements, notes)
+    return replace(found, series=tuple(replace(s, start_s=starts.get(s.path.partition("[")[0])) for s in found.series))
+
+
+def _number(value: object) -> float | None:
+    array = np.asarray(value)
+    number = float(array.reshape(-1)[0]) if array.size == 1 and array.dtype.kind in "iuf" else math.nan
+    return number if math.isfinite(number) else None
 
 
 def check_size(dataset: h5py.Dataset) -> None:

@@ -90,7 +90,7 @@ def store(found: Contents, warned: list[str], out: str) -> None:
     """Writes contents as an npz without pickles."""
     head = {
         "format": found.format,
-        "series": [[one.name, one.path, one.unit] for one in found.series],
+        "series": [[one.name, one.path, one.unit, one.start_s] for one in found.series],
         "statements": [[one.source, one.rate_hz] for one in found.statements],
         "notes": [*found.notes, *warned],
         "nameless": found.nameless,
@@ -104,7 +104,7 @@ def restore(out: str) -> Contents:
     with np.load(out, allow_pickle=False) as arrays:
         head = json.loads(str(arrays["contents"]))
         named = enumerate(head["series"])
-        series = tuple(Series(name, path, unit, arrays[f"a{i}"]) for i, (name, path, unit) in named)
+        series = tuple(Series(name, path, unit, arrays[f"a{i}"], start) for i, (name, path, unit, start) in named)
     statements = tuple(RateStatement(source, rate) for source, rate in head["statements"])
     return Contents(head["format"], series, (), statements, tuple(head["notes"]), head["nameless"])
 

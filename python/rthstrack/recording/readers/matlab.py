@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from rthstrack.recording.readers.arrays import columns, rate_of
-from rthstrack.recording.readers.contents import Contents, RateStatement, Series
+from rthstrack.recording.readers.contents import STARTS, Contents, RateStatement, Series
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -85,9 +85,14 @@ class _Walk:
         """One element of a struct; `label` and `unit` beside numbers speak of these (as in Simulink's structures)."""
         label = _text(fields, "label", "name")
         unit = _text(fields, "unit", "units")
+        first, start_s = len(self.series), _start(fields)
         for key, node in fields.items():
             about = key.lower() in ("values", "data", "value", "y")
             self.visit(f"{name}.{key}", node, label if about else None, unit if about else None, depth + 1)
+        if start_s is not None:
+            self.series[first:] = [
+                one if one.start_s is not None else replace(one, start_s=start_s) for one in self.series[first:]
+            ]
 
     def array(self, name: str, array: NDArray[Any], label: str | None, unit: str | None) -> None:
         rate = rate_of(name, array) if array.size == 1 and array.dtype.kind in "iuf" else None
@@ -104,6 +109,13 @@ def _text(fields: Mapping[str, Node], *keys: str) -> str | None:
     for key, node in fields.items():
         if key.lower() in keys and isinstance(node, str) and node.strip():
             return node.strip()
+    return None
+
+
+def _start(fields: Mapping[str, Node]) -> float | None:
+    for key, node in fields.items():
+        if key.lower() in STARTS and isinstance(node, np.ndarray) and node.size == 1 and node.dtype.kind in "iuf":
+            return float(node.reshape(-1)[0]) if np.isfinite(node).all() else None
     return None
 
 

@@ -25,7 +25,8 @@ _ROUND_OFF = 1e-9
 class Uniform:
     """Stamps of uniform sampling. `low_hz` and `high_hz` bound the rates that the stamps allow.
 
-    `rounded` says that the steps are uneven, as rounding makes them.
+    `rounded` says that the steps are uneven, as rounding makes them; `origin_s` is when the first sample was taken by
+    all stamps together, which rounding does not move.
     """
 
     rate_hz: float
@@ -33,6 +34,7 @@ class Uniform:
     high_hz: float
     start_s: float
     rounded: bool
+    origin_s: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +95,9 @@ def _examine(stamps: NDArray[np.float64], unit_s: float) -> Uniform | Irregular:
     rate = 1 / (slope * unit_s)
     if not 1e-12 < rate < 1e12:
         return _describe(stamps, steps, unit_s)
-    return Uniform(_nice(rate, low, high), low, high, float(stamps[0]) * unit_s, rounded)
+    nice, start = _nice(rate, low, high), float(stamps[0]) * unit_s
+    origin = middle * unit_s - (n - 1) / 2 / nice if rounded else start
+    return Uniform(nice, low, high, start, rounded, origin)
 
 
 def _quantum(stamps: NDArray[np.float64]) -> float:

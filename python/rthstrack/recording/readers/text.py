@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -66,14 +67,45 @@ def read(path: Path) -> Contents:
         elif kind == "text":
             notes.append(f"'{label}' {f'holds text in {values} lines' if values else 'is empty'}, no channel")
         else:
-            clocks.append(Clock(label, label, seconds_since_first(values, dated=kind == "dates")))
+            first = next((int(one) for one in values if one != np.iinfo(np.int64).min), None)
+            seconds = seconds_since_first(values, dated=kind == "dates")
+            clocks.append(Clock(label, label, seconds, first, len(series)))
     statements = rate_statements(table["preamble"], notes, decimal_comma=table["decimal_comma"])
+    series = _own_starts(series, table["preamble"], decimal_comma=table["decimal_comma"])
     form = f"text, {table['delimiter']} between columns" if len(table["columns"]) > 1 else "text, one column"
     if table["decimal_comma"]:
         form += ", decimal comma"
     if table["encoding"] != "UTF-8":
         form += f", {table['encoding']}"
     return Contents(form, tuple(series), tuple(clocks), tuple(statements), tuple(notes), nameless)
+
+
+def _own_starts(series: list[Series], preamble: list[str], *, decimal_comma: bool) -> list[Series]:
+    """The series with what LabVIEW's header says of each channel's begin (X0, in s), where channels differ in it."""
+    cells = {line.split(mark)[0].strip(): line.split(mark) for line in preamble for mark in "\t,;" if mark in line}
+    kind = [cell.strip().lower() for cell in cells.get("X_Columns", [])][1:2]
+    texts = [cell.strip().replace(",", ".") if decimal_comma else cell.strip() for cell in cells.get("X0", [])[1:]]
+    starts = [_start(text) for text in texts if text]
+    times = [_time_of_day(cell) for cell in cells.get("Time", [])[1:] if cell.strip()]
+    if len(times) == len(starts) and not any(map(math.isnan, times)):
+        starts = [start + time - min(times) for start, time in zip(starts, times, strict=True)]
+    if kind not in (["no"], ["one"]) or len(set(starts)) < 2 or any(math.isnan(start) for start in starts):
+        return series
+    first = 1 if kind == ["one"] else 0
+    of = dict(enumerate(starts, start=first))
+    return [replace(one, start_s=of.get(i)) for i, one in enumerate(series)]
+
+
+def _start(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def _time_of_day(text: str) -> float:
+    found = re.fullmatch(r"\s*(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)\s*", text)
+    return 3600 * int(found[1]) + 60 * int(found[2]) + float(found[3].replace(",", ".")) if found else math.nan
 
 
 def seconds_since_first(stamps: NDArray[np.int64], *, dated: bool) -> NDArray[np.float64]:

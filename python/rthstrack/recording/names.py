@@ -1,0 +1,143 @@
+"""What a channel's name says: its role, its quantity and which degree of freedom, in the words of laboratories."""
+
+from __future__ import annotations
+
+import itertools
+import re
+import unicodedata
+from typing import NamedTuple
+
+# In order of preference: what the simulation asks comes before what the controller is sent.
+_ROLES = {
+    "target": (
+        "target targ tgt calculated calc calculada desired des xt objetivo objectif ziel 目標 目标 期望 목표 цель",
+        "reference ref setpoint sp demand dmd soll sollwert consigne consigna referencia riferimento "
+        "référence rampe 設定 设定 給定 给定 задание заданное заданный задано уставка 설정",
+        "command cmd cmnd commanded dcmd xc comando comandado comandada comandato commande commandé "
+        "commandée befehl kommando stellwert 命令 指令 команда 명령",
+    ),
+    "measured": (
+        "measured meas measure msd mes xm ist istwert mesure mesuré mesurée mesures medido medida medição "
+        "misurato misurata misura gemessen messwert 計測 計測値 测量 測量 测定 測定 实测 実測 實測 измерено "
+        "измеренное измеренный измерение 측정 계측",
+        "feedback fbk fdbk fb actual act achieved lvdt encoder temposonic pv real réel réelle reel "
+        "effettivo effettiva retour retroalimentacion rückmeldung 反馈 反饋 フィードバック 实际 實際 実際 "
+        "факт обратная 실제 피드백",
+        "response resp sensor réponse respuesta risposta antwort 応答 响应 響應 отклик 응답",
+    ),
+}
+_QUANTITIES = {
+    "displacement": (
+        "disp displ displacement displacements pos position stroke lvdt encoder temposonic xt xm xc dcmd "
+        "weg hub verschiebung déplacement deplacement course desplazamiento posición posicion spostamento "
+        "posizione deslocamento 位移 変位 變位 位置 ストローク 行程 перемещение положение 변위"
+    ),
+    "force": (
+        "force load frc kraft fuerza loadcell effort charge carga forza carico força 力 荷重 荷载 荷載 сила "
+        "усилие 하중 힘"
+    ),
+    "acceleration": (
+        "acc accel acceleration ag beschleunigung accélération aceleración accelerazione 加速度 ускорение 가속도"
+    ),
+    "velocity": ("vel velocity geschwindigkeit vitesse velocidad velocità 速度 скорость 속도"),
+    "rotation": ("rotation rot angle angular drehung winkel"),
+    "voltage": ("volt voltage current valve spool servo spannung tension voltaje 電圧 电压 電壓 阀 バルブ"),
+    "other": (
+        "temp temperature pressure strain error err fehler erreur time clock counter sample index trigger "
+        "event count cycle cycles segment status flow temperatur druck pression presión 温度 压力 圧力 誤差 "
+        "误差 時間 时间 時刻 ошибка время 시간 오차"
+    ),
+}
+# x_t and x_m, disp_t and disp_m, ...: a letter behind the quantity.
+_LETTERS = {"t": ("target", 0), "d": ("target", 0), "r": ("target", 1), "c": ("target", 2), "m": ("measured", 0)}
+_BEFORE_LETTER = {"x", "u", "d", "f", "disp", "displ", "displacement", "pos", "position", "force", "frc"}
+# Words that say which of several alike a channel is only where nothing else does: a pair may differ in them.
+FILLERS = {"signal", "sig", "channel", "chan", "ch", "data", "value", "values", "val", "out", "output", "in", "input"}
+FILLERS |= {
+    "actuator",
+    "servo",
+    "axial",
+    "controller",
+    "control",
+    "ctrl",
+    "daq",
+    "dac",
+    "adc",
+    "of",
+    "the",
+    "from",
+    "to",
+}
+FILLERS |= {"ai", "ao", "absolute", "relative", "total", "raw", "filtered", "filt", "model", "numerical", "specimen"}
+FILLERS |= {"valor", "valeur", "wert", "канал", "値", "值", "信号"}
+# What a name may consist of that says nothing at all.
+GENERIC = {"channel", "chan", "ch", "column", "col", "ai", "ao", "untitled", "signal", "sig", "var", "data", "value"}
+GENERIC |= {"values", "array", "input", "output", "kanal", "voie", "canal", "通道", "チャンネル"}
+
+
+def plain(text: str) -> str:
+    """A text in lower case without accents."""
+    parted = unicodedata.normalize("NFKD", text.casefold())
+    return unicodedata.normalize("NFC", "".join(c for c in parted if not "\u0300" <= c <= "\u036f"))
+
+
+_ROLE_WORDS = {role: [set(map(plain, level.split())) for level in levels] for role, levels in _ROLES.items()}
+_QUANTITY_WORDS = {kind: set(map(plain, known.split())) for kind, known in _QUANTITIES.items()}
+# Scripts that set no blanks between words are parted at the words that are known.
+_UNSPACED = sorted(
+    {
+        word
+        for level in (*itertools.chain(*_ROLE_WORDS.values()), *_QUANTITY_WORDS.values(), FILLERS, GENERIC)
+        for word in level
+        if word >= "\u2e80"
+    },
+    key=len,
+    reverse=True,
+)
+_PARTED = re.compile("|".join(map(re.escape, _UNSPACED)))
+_COMPOUND = re.compile(
+    r"\b(soll|ist|ziel)(?=weg|position|pos|kraft|lage|hub|verschiebung|last)|(?<=weg|ion|aft|hub)(soll|ist)\b"
+)
+_JOINED = re.compile(r"\b(set|load|feed|soll|ist) (point|cell|back|wert)\b")
+# The current position is no electric current.
+_CURRENT = re.compile(r"\bcurrent (?=pos|disp|stroke|value|force|load|angle)")
+
+
+def words(name: str) -> list[str]:
+    """The words of a name, plain: divided at signs, at capitals and around numbers; two-part ones joined."""
+    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", name)
+    text = " ".join(re.findall(r"[^\W\d_]+|\d+", _PARTED.sub(r" \g<0> ", plain(spaced))))
+    text = _COMPOUND.sub(lambda m: f"{m[1]} " if m[1] else f" {m[2]}", text)
+    return _CURRENT.sub("actual ", _JOINED.sub(r"\1\2", text)).split()
+
+
+class Role(NamedTuple):
+    """Target, measured or None; how plainly (0 best); and which of the words says it (-1 for none)."""
+
+    name: str | None
+    rank: int
+    at: int
+
+
+def role(found: list[str]) -> Role:
+    """What words say of the role."""
+    told = [
+        Role(name, rank, i)
+        for i, word in enumerate(found)
+        for name, levels in _ROLE_WORDS.items()
+        for rank, level in enumerate(levels)
+        if word in level
+    ]
+    # "act1 cmd" is the command of actuator 1; "cmd fbk" is a measured command.
+    clear = [one for one in told if found[one.at] != "act"] or told
+    if clear:
+        return next((one for one in clear if one.name == "measured"), clear[0])
+    for i, (before, letter) in enumerate(itertools.pairwise(found)):
+        if before in _BEFORE_LETTER and letter in _LETTERS:
+            return Role(*_LETTERS[letter], i + 1)
+    return Role(None, 0, -1)
+
+
+def quantities(found: list[str]) -> list[tuple[int, str]]:
+    """Which of the words name a quantity, and which."""
+    return [(i, kind) for i, word in enumerate(found) for kind, known in _QUANTITY_WORDS.items() if word in known]
