@@ -36,13 +36,15 @@ def read_chosen(
     fill: int | None = None,
     start_s: float | None = None,
     end_s: float | None = None,
+    block: int | None = None,
+    lines: tuple[int, int] | None = None,
 ) -> ChosenPairs:
     """Reads a file, takes the pairs named or proposes them, fills gaps, scales channels and cuts.
 
     Raises RecordingError, ChannelError, SettingError, with the file named; no sampling rate is an error.
     """
     file = os.fspath(path)
-    recording = read_recording(file, rate_hz=rate_hz, time=time, resample_hz=resample_hz)
+    recording = read_recording(file, rate_hz=rate_hz, time=time, resample_hz=resample_hz, block=block, lines=lines)
     if recording.rate_hz is None:
         why = f"{file}: no sampling rate: {recording.rate_source}"
         raise RecordingError(why, advice="give {rate_hz} or {time}")

@@ -50,7 +50,8 @@ class TimeColumn:
 
 _TIME_NAMES = re.compile(
     r"t|times?|tout|zeit|messzeit|temps|tiempo|tempo|x[_ ]values?|time[ _-]?stamps?|time[ _-]?(?:axis|vector|base|\d+)|"
-    r"(?:elapsed|running|relative|test|total|run|sample|measurement|record|simulation|sim)[ _-]?time",
+    r"(?:elapsed|running|relative|test|total|run|sample|measurement|record|simulation|sim)[ _-]?time|"
+    "tijd|tid|czas|zaman|aika|čas|время|час|χρόνος|時間|时间|時刻|时刻|経過時間|시간|समय|الزمن|الوقت|זמן",
     re.IGNORECASE,
 )
 
@@ -83,7 +84,10 @@ def _is_time(series: Series, unit_s: float | None) -> bool:
         return stem != "T" or unit_s is not None or bool(np.all(np.diff(series.values) > 0))
     # "Time  1 - default sample rate" and the like, but not "time delay".
     loose = re.match(r"(time|zeit)\b", stem, re.IGNORECASE) is not None
-    return loose and len(series.values) > 1 and bool(np.all(np.diff(series.values) > 0))
+    if loose and len(series.values) > 1:
+        return bool(np.all(np.diff(series.values) > 0))
+    # Whatever its name: what rises evenly in a unit of time is time.
+    return unit_s is not None and len(series.values) > 3 and isinstance(examine(series.values, unit_s), Uniform)
 
 
 def _unit(series: Series) -> str | None:

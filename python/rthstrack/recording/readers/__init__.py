@@ -13,7 +13,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from rthstrack.errors import RecordingError, printable
+from rthstrack.errors import RecordingError, SettingError, printable
+from rthstrack.recording.readers.contents import WHOLE, Part
 
 if TYPE_CHECKING:
     from rthstrack.recording.readers.contents import Contents
@@ -34,7 +35,7 @@ class Beginning(NamedTuple):
 class Format(NamedTuple):
     """A file format: its name and what help calls it, its module, usual endings, and how it is recognised.
 
-    `module` has a function `reader` (path) -> Contents.
+    `module` has a function `reader` (path) -> Contents, or (path, part) where the format `has_parts`.
     """
 
     name: str
@@ -43,10 +44,17 @@ class Format(NamedTuple):
     endings: tuple[str, ...]
     recognises: Callable[[Beginning], bool]
     reader: str = "read"
+    has_parts: bool = False
 
-    def read(self, file: Path) -> Contents:
-        """Everything in a file of this format."""
-        found: Contents = getattr(import_module(f"{__name__}.{self.module}"), self.reader)(file)
+    def read(self, file: Path, part: Part = WHOLE) -> Contents:
+        """Everything in a file of this format, or a part of it."""
+        if part != WHOLE and not self.has_parts:
+            formats = " and ".join(dict.fromkeys(one.called for one in FORMATS if one.has_parts))
+            raise RecordingError(
+                f"block and lines choose a part of {formats} files; this one is {self.name}", code="no_parts"
+            )
+        read = getattr(import_module(f"{__name__}.{self.module}"), self.reader)
+        found: Contents = read(file, part) if self.has_parts else read(file)
         return found
 
 
@@ -72,7 +80,14 @@ FORMATS = (
     Format("NumPy npy", "NumPy", "numpy_file", (".npy",), lambda b: b.starts(b"\x93NUMPY"), "read_npy"),
     Format("NumPy npz", "NumPy", "numpy_file", (".npz",), lambda b: b.starts(b"PK\3\4", b"PK\5\6"), "read_npz"),
     Format("PEER AT2", "text", "at2", (".at2",), _is_at2),
-    Format("text", "text", "text", (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm", ".prn", ".out"), lambda _: True),
+    Format(
+        "text",
+        "text",
+        "text",
+        (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm", ".prn", ".out"),
+        lambda _: True,
+        has_parts=True,
+    ),
 )
 _TEXT = FORMATS[-1]
 #: What they are called in help and messages: text first.
@@ -80,6 +95,10 @@ FORMAT_NAMES = tuple(dict.fromkeys(("text", *(one.called for one in FORMATS))))
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _RECORDING_WARNINGS = threading.Lock()
 _OTHERS = (
+    (
+        b"version https://git-lfs.github.com/spec/",
+        "a Git LFS pointer, which stands for the file; fetch the file itself with 'git lfs pull'",
+    ),
     (b"\xd0\xcf\x11\xe0", "an old Excel or Office file; save the sheet as CSV"),
     (b"\x1f\x8b", "a gzip archive; unpack it first"),
     (b"TDSh", "the index of a TDMS file; give the .tdms file beside it"),
@@ -90,24 +109,29 @@ _OTHERS = (
 )
 
 
-def read_contents(path: str | os.PathLike[str]) -> Contents:
-    """Reads everything in a file, whatever its format.
+def read_contents(
+    path: str | os.PathLike[str], *, block: int | None = None, lines: tuple[int, int] | None = None
+) -> Contents:
+    """Reads everything in a file, whatever its format; of text and workbooks a block of rows (from 1) or some lines.
 
     Raises RecordingError, one line with the file's name: missing, empty, damaged, of an unknown format, or without
-    channels. This is the one place where a library's own exceptions end.
+    channels, or a part of what has none. This is the one place where a library's own exceptions end.
     """
+    part = Part(block, lines)
+    if block is not None and lines is not None:
+        raise SettingError("block and lines exclude each other")
     file = Path(path)
     try:
         found = _format(file)
         if found is _TEXT:
-            contents, caught = _read_text(file), []
+            contents, caught = _read_text(file, part), []
         else:
             # The interpreter has one list of warning filters: whoever records warnings must be alone.
             with _RECORDING_WARNINGS, warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always")
-                contents = found.read(file)
+                contents = found.read(file, part)
     except RecordingError as error:
-        raise _error(path, error) from error.__cause__
+        raise _error(path, Exception.__str__(error), error) from error.__cause__
     except OSError as error:
         raise _error(path, error.strerror or _first_line(error)) from error
     except ImportError as error:
@@ -131,11 +155,13 @@ def read_contents(path: str | os.PathLike[str]) -> Contents:
     )
 
 
-def _error(path: str | os.PathLike[str], what: object) -> RecordingError:
-    """One printable line that begins with the file."""
+def _error(path: str | os.PathLike[str], what: object, error: RecordingError | None = None) -> RecordingError:
+    """One printable line that begins with the file; code, values and advice are those of the error it stands for."""
     file, words = printable(os.fspath(path)), printable(str(what))
-    room = max(1000 - len(f"{file}: "), 3)
-    return RecordingError(words if len(words) <= room else words[: room - 3] + "...", file=file)
+    code, values, advice = (error.code, error.values, error.advice) if error else (None, None, "")
+    room = max(1000 - len(f"{file}: ") - len(advice), 3)
+    words = words if len(words) <= room else words[: room - 3] + "..."
+    return RecordingError(words, file=file, code=code, values=values, advice=advice)
 
 
 def _first_line(cause: object) -> str:
@@ -180,16 +206,18 @@ def _format(file: Path) -> Format:
     return next(one for one in FORMATS if one.recognises(beginning))
 
 
-def _read_text(file: Path) -> Contents:
+def _read_text(file: Path, part: Part) -> Contents:
     """What no signature tells is text; a name that promises something else is told where it is none."""
     named = next((one for one in FORMATS if one is not _TEXT and file.suffix.lower() in one.endings), None)
     try:
-        return _TEXT.read(file)
+        return _TEXT.read(file, part)
     except RecordingError as error:
         if named is None:
             raise
-        what = f"named {file.suffix}, but it does not begin as {named.name} does, and as text: {error}"
-        raise RecordingError(what) from None
+        what = (
+            f"named {file.suffix}, but it does not begin as {named.name} does, and as text: {Exception.__str__(error)}"
+        )
+        raise RecordingError(what, code=error.code, values=error.values, advice=error.advice) from None
 
 
 def _hdf5_behind_a_block(seek: Callable[[int], int], read: Callable[[int], bytes]) -> bool:

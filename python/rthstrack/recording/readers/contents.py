@@ -10,6 +10,17 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Which part of a text file or workbook is read: a block of rows (a sheet), from 1; lines, the first and the last."""
+
+    block: int | None = None
+    lines: tuple[int, int] | None = None
+
+
+WHOLE = Part()
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Series:
     """One column of numbers (n_samples,). `unit` is what the file states apart from the name."""
