@@ -37,7 +37,6 @@ ALLOWED = {
     ("live/view.py", "ambiguous, delays of (\\S+) and (\\S+) ms fit"): "the view does not read reason_code yet",
     ("live/view.py", "not determined: "): "the view does not read reason_code yet",
     ("live/view.py", "too little motion"): "the view does not read reason_code yet",
-    ("recording/readers/matlab.py", "MATLAB object"): "notes of readers have no code yet",
 }
 
 

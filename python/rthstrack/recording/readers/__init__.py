@@ -64,6 +64,12 @@ def _is_at2(b: Beginning) -> bool:
     return at2.recognised(b.file)
 
 
+def _is_workbook(b: Beginning) -> bool:
+    from rthstrack.recording.readers import excel
+
+    return b.starts(b"\xd0\xcf\x11\xe0") or (b.starts(b"PK\3\4") and excel.recognised(b.file))
+
+
 def _is_matlab(b: Beginning) -> bool:
     return not b.is_hdf5 and (b.starts(b"MATLAB 5.0") or b.head[126:128] in (b"IM", b"MI") or _is_mat4(b.head))
 
@@ -71,13 +77,20 @@ def _is_matlab(b: Beginning) -> bool:
 #: Every format, in the order in which they are looked for: the last is what no other is.
 FORMATS = (
     Format("MATLAB", "MATLAB", "mat", (".mat",), _is_matlab),
-    Format("MATLAB v7.3", "MATLAB", "mat73", (".mat",), lambda b: b.starts(b"MATLAB 7")),
+    Format(
+        "MATLAB v7.3",
+        "MATLAB",
+        "mat73",
+        (".mat",),
+        lambda b: b.starts(b"MATLAB 7", *([b"MATLAB"] if b.is_hdf5 else [])),
+    ),
     Format("HDF5", "HDF5", "hdf5", (".h5", ".hdf5", ".hdf", ".he5"), lambda b: b.is_hdf5),
     Format("TDMS", "TDMS", "tdms", (".tdms",), lambda b: b.starts(b"TDSm")),
     Format("Parquet", "Parquet", "parquet", (".parquet", ".pq"), lambda b: b.starts(b"PAR1")),
     Format("Arrow stream", "Arrow", "arrow", (".arrows", ".arrow"), lambda b: b.starts(b"\xff\xff\xff\xff")),
     Format("Arrow file", "Arrow", "arrow", (".arrow", ".feather"), lambda b: b.starts(b"ARROW1\0\0")),
     Format("NumPy npy", "NumPy", "numpy_file", (".npy",), lambda b: b.starts(b"\x93NUMPY"), "read_npy"),
+    Format("Excel", "Excel", "excel", (".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"), _is_workbook, has_parts=True),
     Format("NumPy npz", "NumPy", "numpy_file", (".npz",), lambda b: b.starts(b"PK\3\4", b"PK\5\6"), "read_npz"),
     Format("PEER AT2", "text", "at2", (".at2",), _is_at2),
     Format(
@@ -99,7 +112,6 @@ _OTHERS = (
         b"version https://git-lfs.github.com/spec/",
         "a Git LFS pointer, which stands for the file; fetch the file itself with 'git lfs pull'",
     ),
-    (b"\xd0\xcf\x11\xe0", "an old Excel or Office file; save the sheet as CSV"),
     (b"\x1f\x8b", "a gzip archive; unpack it first"),
     (b"TDSh", "the index of a TDMS file; give the .tdms file beside it"),
     (b"7z\xbc\xaf", "a 7z archive; unpack it first"),
@@ -174,15 +186,16 @@ def _summed(notes: list[str]) -> list[str]:
     """The notes, each once, and one for all of whom the same is to be said."""
     alike: dict[str, list[str]] = {}
     for note in dict.fromkeys(notes):
-        name, mark, rest = note.rpartition("' ")
-        alike.setdefault(rest if mark and name.startswith("'") else note, []).append(name + "'")
+        _, mark, rest = note.rpartition("' ")
+        alike.setdefault(rest if mark and note.startswith("'") else note, []).append(note)
     said = []
-    for rest, names in alike.items():
-        if rest in notes:
-            said.append(rest)
+    for rest, group in alike.items():
+        if len(group) == 1:
+            said += group
         else:
+            names = [note.rpartition("' ")[0] + "'" for note in group]
             listed = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
-            said.append(f"{listed} {rest}" if len(names) == 1 else f"{listed}: each {rest}")
+            said.append(f"{listed}: each {rest}")
     return said
 
 

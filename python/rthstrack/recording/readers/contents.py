@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Which part of a text file or workbook is read: a block of rows (a sheet), from 1; lines, the first and the last."""
+    """Which part of a text file or workbook is read: a block of rows (a sheet), from 1; the first and the last line."""
 
     block: int | None = None
     lines: tuple[int, int] | None = None
