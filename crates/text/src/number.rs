@@ -131,7 +131,14 @@ pub(crate) fn parse(token: &[u8], point: u8) -> Option<f64> {
 ///
 /// `sure` asks that it cannot be read otherwise: `1,234` may have three decimals.
 pub(crate) fn grouped(token: &[u8], point: u8, sure: bool) -> Option<f64> {
-    if token.len() > 60 || !token.iter().any(|b| matches!(b, b',' | b'.' | b'\'' | b' ' | 0xa0 | 0xaf)) {
+    // Most tokens end here: one to three digits, no zero first, then a mark that is not the decimal one.
+    let digits = token.strip_prefix(b"-").or_else(|| token.strip_prefix(b"+")).unwrap_or(token);
+    let first = digits.iter().take(4).take_while(|b| b.is_ascii_digit()).count();
+    let mark = *digits.get(first)?;
+    if !(1..=3).contains(&first) || digits[0] == b'0' || mark == point || token.len() > 60 {
+        return None;
+    }
+    if !matches!(mark, b',' | b'.' | b'\'' | b' ' | 0xa0 | 0xc2 | 0xe2) {
         return None;
     }
     // The blanks that typesetters use: without a break, thin, narrow; the first in Latin-1 too.
@@ -152,7 +159,7 @@ pub(crate) fn grouped(token: &[u8], point: u8, sure: bool) -> Option<f64> {
     let numeric = groups.iter().all(|group| group.bytes().all(|b| b.is_ascii_digit()));
     let fraction = decimals.is_none_or(|rest| rest.bytes().all(|b| b.is_ascii_digit()));
     let doubtful = decimals.is_none() && groups.len() == 2 && matches!(mark, ',' | '.' | ' ');
-    if !(apart && numeric && fraction) || digits.starts_with('0') || sure && doubtful {
+    if !(apart && numeric && fraction) || sure && doubtful {
         return None;
     }
     let sign = if whole.starts_with('-') { "-" } else { "" };

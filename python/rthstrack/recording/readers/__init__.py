@@ -64,6 +64,12 @@ def _is_at2(b: Beginning) -> bool:
     return at2.recognised(b.file)
 
 
+def _is_accelerogram(b: Beginning) -> bool:
+    from rthstrack.recording.readers import accelerograms
+
+    return accelerograms.kind(b.head) is not None
+
+
 def _is_workbook(b: Beginning) -> bool:
     from rthstrack.recording.readers import excel
 
@@ -92,6 +98,7 @@ FORMATS = (
     Format("NumPy npy", "NumPy", "numpy_file", (".npy",), lambda b: b.starts(b"\x93NUMPY"), "read_npy"),
     Format("Excel", "Excel", "excel", (".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"), _is_workbook, has_parts=True),
     Format("NumPy npz", "NumPy", "numpy_file", (".npz",), lambda b: b.starts(b"PK\3\4", b"PK\5\6"), "read_npz"),
+    Format("accelerogram", "text", "accelerograms", (), _is_accelerogram),
     Format("PEER AT2", "text", "at2", (".at2",), _is_at2),
     Format(
         "text",
@@ -157,7 +164,7 @@ def read_contents(
         said = "; ".join(notes[:3]) or "nothing of the kind"
         raise _error(path, f"no channels; expected vectors of numbers ({contents.format}), found: {said}")
     ending = file.suffix.lower()
-    if any(ending in one.endings for one in FORMATS) and ending not in found.endings:
+    if any(ending in one.endings for one in FORMATS) and found.endings and ending not in found.endings:
         notes.append(f"named {file.suffix}, but the content is {contents.format}")
     return replace(
         contents,
