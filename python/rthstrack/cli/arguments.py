@@ -70,6 +70,7 @@ OPTIONS = {
     "time": "--time CHANNEL",
     "resample_hz": "--resample HZ",
     "fill": "--fill SAMPLES",
+    "start_s": "--start S",
     "end_s": "--end S",
     "block": "--block N",
     "lines": "--lines A:B",

@@ -92,7 +92,7 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
         document = {
             "results": [result_entry(a) for a in assessments],
             "failures": [
-                {"file": file, "error": str(error), "code": error.code, "values": json_ready(error.values)}
+                {"file": file, "error": told(error), "code": error.code, "values": json_ready(error.values)}
                 for file, error in failures
             ],
         }
@@ -100,7 +100,7 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
     else:
         _print_text(results, len(args.files))
     for _, error in failures:
-        print(f"rthstrack: {error}", file=sys.stderr)
+        print(f"rthstrack: {told(error)}", file=sys.stderr)
     for note in notes:
         print(note, file=sys.stderr)
     if failures:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from rthstrack.errors import RecordingError, SettingError
 from rthstrack.recording.pairing import propose_pair
 from rthstrack.recording.reading import read_recording
@@ -59,4 +61,30 @@ def read_chosen(
     if start_s is not None or end_s is not None:
         recording = recording.cut(start_s, end_s)
     assert recording.rate_hz is not None
+    _refuse_blank_ends(recording, [name for pair in pairs for name in pair])
     return ChosenPairs(recording, recording.rate_hz, pairs, proposal)
+
+
+def _refuse_blank_ends(recording: Recording, selectors: Sequence[str]) -> None:
+    """Where a channel begins or ends with nothing, no gap can be filled: what is left is told, to be cut to."""
+    for selector in selectors:
+        channel = recording.channel(selector)
+        known = np.flatnonzero(np.isfinite(channel.values))
+        n_before, n_after = (int(known[0]), len(channel.values) - 1 - int(known[-1])) if known.size else (0, 0)
+        if not n_before and not n_after:
+            continue
+        assert recording.rate_hz is not None
+        first, end = n_before / recording.rate_hz, (len(channel.values) - n_after) / recording.rate_hz
+        where = " and ".join(
+            f"{n} sample(s) at the {place}" for n, place in ((n_before, "start"), (n_after, "end")) if n
+        )
+        cut = " and ".join(
+            f"{{{key}}} = {at:g}" for n, key, at in ((n_before, "start_s", first), (n_after, "end_s", end)) if n
+        )
+        raise RecordingError(
+            f"channel '{channel.path}' is blank or not finite in {where}",
+            file=recording.file,
+            code="blank_ends",
+            values=(first, end),
+            advice=f"cut there: {cut} s",
+        )

@@ -194,4 +194,4 @@ def _fixed(line: str, width: int, number: int) -> list[float]:
     """The numbers of a line in columns of this width, which need no blank between them."""
     line = line.rstrip()
     texts = [line[i : i + width].strip() for i in range(0, len(line), max(width, 1))]
-    return _numbers([text for text in texts if text], number).tolist()
+    return list(map(float, _numbers([text for text in texts if text], number)))
