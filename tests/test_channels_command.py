@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 
 from rthstrack.cli import channels, main
@@ -135,3 +137,14 @@ def test_advice_speaks_of_arguments_in_the_library_and_of_options_in_the_command
     assert main(["evaluate", str(file)]) == 1
     assert f"{file}: no sampling rate: " in (err := capsys.readouterr().err)
     assert err.endswith("; give --rate HZ or --time CHANNEL\n")
+
+
+def test_a_channel_that_ends_with_nothing_says_where_to_cut(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    values = np.sin(np.arange(300) / 20)
+    rows = [f"{i / 100:.2f},{v:.4f},{0.97 * v if i <= 280 else math.nan:.4f}\n" for i, v in enumerate(values)]
+    file = tmp_path / "run.csv"
+    file.write_text("t,target,measured\n" + "".join(rows).replace("nan", ""))
+    assert main(["evaluate", str(file), "--fill", "3"]) == 1
+    err = capsys.readouterr().err
+    assert "19 sample(s) at the end; cut there: --end S = 2.81 s" in err
+    assert main(["evaluate", str(file), "--end", "2.81"]) == 0

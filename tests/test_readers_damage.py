@@ -18,6 +18,7 @@ from nptdms import TdmsWriter
 from rthstrack.errors import RecordingError, printable
 from rthstrack.recording import Recording, read_recording
 from test_readers_formats import build_v73, v73, waveform
+from workbooks import write_workbook
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,7 +28,7 @@ TARGET, MEASURED = np.sin(T), 0.9 * np.sin(T - 0.02)
 # More of them with RTHSTRACK_FUZZ=10000, say.
 N_DAMAGED = int(os.environ.get("RTHSTRACK_FUZZ", "240"))
 # Each needs a process of its own.
-N_DAMAGED_MAT = max(8, N_DAMAGED // 40)
+N_DAMAGED_APART = max(8, N_DAMAGED // 40)
 
 
 def write_csv(path: Path) -> None:
@@ -91,6 +92,11 @@ def write_mat(path: Path) -> None:
     scipy.io.savemat(path, {"data": data, "x": np.vstack([T, TARGET]), "fs": 50.0})
 
 
+def write_xlsx(path: Path) -> None:
+    rows = [[t, x, y] for t, x, y in zip(T.tolist(), TARGET.tolist(), MEASURED.tolist(), strict=True)]
+    write_workbook(path, {"Run": [["time", "target", "measured"], *rows]})
+
+
 WRITERS: dict[str, Callable[[Path], None]] = {
     "csv": write_csv,
     "mat73.mat": write_v73,
@@ -102,9 +108,12 @@ WRITERS: dict[str, Callable[[Path], None]] = {
     "npz": write_npz,
     "npy": write_npy,
     "mat": write_mat,
+    "xlsx": write_xlsx,
 }
 
 
+# Read in a process of its own.
+APART = ("mat", "xlsx")
 # What was written piece by piece is read as far as its pieces are whole.
 TOLERANT = ("arrows", "arrow")
 
@@ -161,7 +170,7 @@ def test_damaged_files_end_in_one_line_or_in_a_reading(tmp_path: Path, ending: s
     whole = path.read_bytes()
     chance = random.Random(f"{ending} 2014")
     n_errors = 0
-    n = N_DAMAGED_MAT if ending == "mat" else N_DAMAGED
+    n = N_DAMAGED_APART if ending in APART else N_DAMAGED
     for _ in range(n):
         path.write_bytes(damaged(whole, chance))
         recording = read_or_error(path)
@@ -174,7 +183,7 @@ def test_damaged_files_end_in_one_line_or_in_a_reading(tmp_path: Path, ending: s
     assert n_errors > n // (16 if ending in TOLERANT else 8)
 
 
-@pytest.mark.parametrize("ending", [ending for ending in WRITERS if ending not in ("csv", "mat", *TOLERANT)])
+@pytest.mark.parametrize("ending", [ending for ending in WRITERS if ending not in ("csv", *APART, *TOLERANT)])
 def test_files_cut_off_anywhere_are_an_error(tmp_path: Path, ending: str) -> None:
     path = tmp_path / f"file.{ending}"
     WRITERS[ending](path)

@@ -18,7 +18,7 @@ from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 
 from rthstrack.errors import RecordingError
 from rthstrack.recording import Recording, propose_pair, read_recording
-from rthstrack.recording.readers import mat
+from rthstrack.recording.readers import apart
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -181,7 +181,7 @@ def test_a_crash_of_the_matlab_reader_is_one_line_here(
     (fake.parent / "__init__.py").write_text("")
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path / "fake"), os.environ.get("PYTHONPATH", "")]))
     if crash == "hang":
-        monkeypatch.setattr(mat, "TIMEOUT_S", 3.0)
+        monkeypatch.setattr(apart, "TIMEOUT_S", 3.0)
     said = {
         "abort": "it crashed the reading process",
         "hang": "took more than 3 s",
@@ -531,7 +531,7 @@ def test_a_wrongly_named_file_is_read_for_what_it_is_and_said_so(tmp_path: Path)
             "named .parquet, but it does not begin as Parquet does, and as text: no rows of numbers",
         ),
         ("file.xlsx", b"PK\x05\x06" + b"\0" * 18, "a zip archive; expected NumPy arrays in it"),
-        ("file.xls", b"\xd0\xcf\x11\xe0" + b"\0" * 600, "an old Excel or Office file; save the sheet as CSV"),
+        ("file.xls", b"\xd0\xcf\x11\xe0" + b"\0" * 600, "the file is damaged, or no Excel file"),
         ("file.csv.gz", b"\x1f\x8b" + b"\0" * 600, "a gzip archive; unpack it first"),
         (
             "file.mat",

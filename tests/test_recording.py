@@ -571,3 +571,37 @@ def test_the_records_of_the_machine_have_the_pair_that_is_known(shared: Path) ->
     assert pairs == [("CHANNEL2", "CHANNEL0")]
     assert "a guess" in why
     assert propose_pair(read_recording(shared / "records" / "utfsm_chirp_0A.csv"))[0] == [("cmd_mm", "meas_mm")]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "时间(s)",
+        "时间（s）",
+        "時間(s)",
+        "時刻 [s]",
+        "Время, с (s)",
+        "시간(s)",
+        "Zeit",
+        "Temps",
+        "Tiempo",
+        "Tempo",
+        "Laufzeit [s]",
+    ],
+)
+def test_time_is_told_by_its_name_in_any_language_or_by_its_unit(tmp_path: Path, name: str) -> None:
+    rows = "".join(f"{i / 50};{i % 3};{i % 5}\n" for i in range(20))
+    recording = read_recording(written(tmp_path, f"{name};a;b\n{rows}"))
+    assert recording.rate_hz == 50.0
+    # What does not rise evenly is no time, whatever its unit.
+    if not name.startswith("Laufzeit"):
+        return
+    rows = "".join(f"{i % 7};{i % 3};{i % 5}\n" for i in range(20))
+    assert read_recording(written(tmp_path, f"{name};a;b\n{rows}")).rate_hz is None
+
+
+def test_a_git_lfs_pointer_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "run.mat"
+    path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0123\nsize 123456\n")
+    with pytest.raises(RecordingError, match="Git LFS pointer"):
+        read_recording(path)

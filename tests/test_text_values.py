@@ -12,8 +12,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rthstrack.errors import RecordingError
+from rthstrack.cli.arguments import told
+from rthstrack.errors import RecordingError, SettingError
 from rthstrack.recording import Recording, read_recording
+from rthstrack.said import Said
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -250,7 +252,7 @@ def test_the_other_text_records_are_read_whole(shared: Path) -> None:
         (b"t,x\n0.0,1.0\n0.1,\x00\n", "byte 0x00 at offset 16; expected lines of numbers, found binary content"),
         (b"\x01\x02\x03garbage,1.0\n", "byte 0x01 at offset 0"),
         (bytes(range(256)) * 4, "not a text file"),
-        (b"\xff\xfe" + "t,x\n0,1\n".encode("utf-16-le") + b"\x31", "half a character at byte offset 18"),
+        (b"\xff\xfe" + "t,x\n0,1\n".encode("utf-16-le") + b"\x00\xd8" * 2, "half a character at byte offset 18"),
         (b"t,x,y\n0.0,1,2\n0.1,1\n0.2,1,2\n", "line 3: expected 3 fields, found 2 (the first one missing is 'y')"),
         (b"t,x\n0.0,1\n0.1,1,7\n0.2,1\n", "line 3: expected 2 fields, found 3 (the last column is 'x')"),
         (b"t,x\n0.0,1\n0.1,1O\n0.2,1\n", "line 3, column 'x': expected a number, found '1O'"),
@@ -258,9 +260,8 @@ def test_the_other_text_records_are_read_whole(shared: Path) -> None:
         (b"0.0,abc,1.5\n0.1,1.5,2\n0.2,1,2\n", "line 1, column 'column 1': expected a number, found 'abc'"),
         (b"t,x,y\n0.0,1.0\n0.1,1.5,2\n0.2,1,2\n", "line 2: expected 3 fields, found 2"),
         (b"t x y\n0.0 1.0\n0.1 1.5 2\n0.2 1 2\n", "line 2: expected 3 fields, found 2 (the first one missing is 'y')"),
-        (b"t,x\n0.0,1\n0.1,2\nend of test\n", "line 4, column 't': expected a number, found 'end of test'"),
         (b"t,x\n0.0,1\n0.1,2\n0.2,", None),
-        (b"t,x\n0,001,1,5\n0,002,2,5\n", "line 1 names 2 columns, but line 2 has 4 fields"),
+        (b"t,x\n0,001,1\n0,002,2\n", "line 1 names 2 columns, but line 2 has 3 fields"),
         (b"t,x,y\n0.0,1\n0.1,2\n", "line 1 names 3 columns, but line 2 has 2 fields"),
         (b"t,x\n0.0,1_000\n0.1,2\n0.2,3\n0.3,5\n", "line 2, column 'x': expected a number, found '1_000'"),
         (b"t,x\n0.0," + b"9" * 500 + b"x\n0.1,2\n0.2,3\n0.3,4\n", "found '" + "9" * 40 + "...'"),
@@ -281,6 +282,35 @@ def test_what_is_wrong_with_a_text_is_said_in_one_line(tmp_path: Path, content: 
     assert said in message
     assert message.startswith(str(tmp_path / "file.csv"))
     assert "\n" not in message
+
+
+def test_what_is_no_row_is_left_out_and_told_with_its_line(tmp_path: Path) -> None:
+    found = read(tmp_path, "t,x\n0.0,1\n0.1,2\n0.2,3\n\nMax,3\nend of test\n")
+    assert columns(found) == {"t": [0.0, 0.1, 0.2], "x": [1.0, 2.0, 3.0]}
+    assert [(note.code, note.values) for note in found.notes if isinstance(note, Said)] == [("left_out", (6.0, 7.0))]
+
+
+def test_a_part_of_a_file_is_read_and_what_has_no_parts_says_so(tmp_path: Path) -> None:
+    (tmp_path / "a.dat").write_text("t,x\n0.0,1\n0.1,2\n0.2,3\n\na,b,c\n1,2,3\n4,5,6\n")
+    chosen = [read_recording(tmp_path / "a.dat", block=n, rate_hz=10) for n in (1, 2)]
+    assert [[c.name for c in one.channels] for one in chosen] == [["t", "x"], ["a", "b", "c"]]
+    by_lines = read_recording(tmp_path / "a.dat", lines=(3, 4), rate_hz=10)
+    assert columns(by_lines) == {"t": [0.1, 0.2], "x": [2.0, 3.0]}
+    with pytest.raises(RecordingError, match="expected 1 to 2"):
+        read_recording(tmp_path / "a.dat", block=3)
+    with pytest.raises(SettingError, match="exclude each other"):
+        read_recording(tmp_path / "a.dat", block=1, lines=(1, 2))
+    np.save(tmp_path / "a.npy", np.zeros((4, 2)))
+    with pytest.raises(RecordingError) as caught:
+        read_recording(tmp_path / "a.npy", block=1)
+    assert caught.value.code == "no_parts"
+
+
+def test_a_broken_row_names_the_way_out(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError) as caught:
+        read(tmp_path, "t,x\n0.0,1\n0.1,ERR\n0.2,3\n")
+    assert (caught.value.code, caught.value.values) == ("broken_row", (3,))
+    assert "--lines A:B" in told(caught.value)
 
 
 def test_the_line_number_counts_every_line_of_the_file(tmp_path: Path) -> None:

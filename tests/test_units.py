@@ -126,4 +126,4 @@ def test_a_row_of_names_is_not_a_row_of_units(tmp_path: Path) -> None:
 
 
 def test_what_is_no_unit_measures_nothing() -> None:
-    assert [quantity(one) for one in (None, "", "volts", "a1", "5 mm")] == [None] * 5
+    assert [quantity(one) for one in (None, "", "furlongs", "a1", "5 mm")] == [None] * 5

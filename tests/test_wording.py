@@ -30,7 +30,6 @@ WORD = re.compile(r"[^\W\d_]{2}")
 ALLOWED = {
     ("cli/monitor_options.py", "--log, its readings"): "a key of its own table",
     ("live/view.py", "not determined: "): "a reason is shown without what its colour says already",
-    ("recording/readers/matlab.py", "MATLAB object"): "notes of readers have no code yet",
 }
 
 

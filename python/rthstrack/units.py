@@ -41,8 +41,13 @@ def is_length(unit: str | None) -> bool:
     return quantity(unit) == "length"
 
 
+# Brackets as wide as the characters of Chinese and Japanese names.
+_WIDE_BRACKETS = str.maketrans("（）［］【】", "()[][]")
+
+
 def split_unit(name: str) -> tuple[str, str | None]:
     """A channel's name without its unit, and the unit: from `Disp (mm)`, `Disp [mm]`, `Disp, mm` or `disp_mm`."""
+    name = name.translate(_WIDE_BRACKETS)
     found = re.fullmatch(r"(.*\S)\s*\[([^\[\]]{1,16})\]", name)
     # An index ([:,0]) is no unit.
     if found and re.search(r"[^\W\d_]|[%°-]", found[2]):

@@ -24,6 +24,8 @@ pub(crate) enum Kind {
 pub(crate) struct Dialect {
     pub(crate) delimiter: Delimiter,
     pub(crate) point: u8,
+    /// Whether thousands are set apart.
+    pub(crate) grouped: bool,
     /// What each column of an ordinary row holds; Nothing where the sample had no entry.
     pub(crate) kinds: Vec<Kind>,
     pub(crate) order: Order,
@@ -37,7 +39,12 @@ impl Dialect {
 
     /// What a field holds.
     pub(crate) fn kind(&self, field: &[u8]) -> Kind {
-        kind(field, self.point)
+        match kind(field, self.point) {
+            Kind::Text if self.grouped && number::grouped(&unquoted(field), self.point, false).is_some() => {
+                Kind::Number
+            }
+            found => found,
+        }
     }
 
     /// Whether a line has the fields of a row, at least one number among them.
@@ -65,6 +72,8 @@ fn kind(field: &[u8], point: u8) -> Kind {
         Kind::Number
     } else if stamp::parse(&token, Order::MonthFirst).is_some() || stamp::parse(&token, Order::DayFirst).is_some() {
         Kind::Stamp
+    } else if number::grouped(&token, point, true).is_some() {
+        Kind::Number
     } else {
         Kind::Text
     }
@@ -147,6 +156,7 @@ fn judge(lines: &[&[u8]], delimiter: Delimiter, point: u8) -> Option<(f64, Diale
     let n_below = lines.len() - rows.iter().position(|row| row.0 == n_columns).unwrap_or(0);
     let mut decided = None;
     let mut customary = None;
+    let mut grouped = false;
     for (line, &(n_fields, weight, share)) in lines.iter().zip(&rows) {
         if n_fields != n_columns {
             continue;
@@ -157,7 +167,10 @@ fn judge(lines: &[&[u8]], delimiter: Delimiter, point: u8) -> Option<(f64, Diale
         each_field(line, delimiter, |field| {
             match kind(field, point) {
                 Kind::Nothing => {}
-                Kind::Number => counts[column][0] += weight,
+                Kind::Number => {
+                    counts[column][0] += weight;
+                    grouped |= number::parse(&unquoted(field), point).is_none();
+                }
                 Kind::Stamp => {
                     counts[column][1] += weight;
                     let token = unquoted(field);
@@ -191,7 +204,7 @@ fn judge(lines: &[&[u8]], delimiter: Delimiter, point: u8) -> Option<(f64, Diale
         return None;
     }
     let order = decided.or(customary).unwrap_or(Order::MonthFirst);
-    let dialect = Dialect { delimiter, point, kinds, order };
+    let dialect = Dialect { delimiter, point, grouped, kinds, order };
     // Lines of the preamble may have as many fields, but not of these kinds.
     let ours = lines.iter().zip(rows).filter(|(line, row)| row.0 == n_columns && dialect.fits(line));
     let score = ours.map(|(_, row)| row.1).sum();

@@ -29,8 +29,9 @@ impl Encoding {
 /// How far into the file its kind is judged.
 const HEAD: usize = 4096;
 
-/// The bytes with ASCII as ASCII (UTF-8 or Latin-1, without a byte order mark), and how the file spelt them.
-pub(crate) fn decode(bytes: &[u8]) -> Result<(Cow<'_, [u8]>, Encoding), TextError> {
+/// The bytes with ASCII as ASCII (UTF-8 or Latin-1, without a byte order mark), how the file spelt them, and whether it
+/// ends amid a character.
+pub(crate) fn decode(bytes: &[u8]) -> Result<(Cow<'_, [u8]>, Encoding, bool), TextError> {
     let utf16 = match bytes {
         [0xff, 0xfe, rest @ ..] => Some((rest, Encoding::Utf16Le)),
         [0xfe, 0xff, rest @ ..] => Some((rest, Encoding::Utf16Be)),
@@ -58,7 +59,8 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<(Cow<'_, [u8]>, Encoding), TextErro
     if let Some(at) = head.iter().position(strange) {
         return Err(TextError::Binary { offset: at + offset, byte: head[at] });
     }
-    Ok((ascii, encoding))
+    let halved = matches!(encoding, Encoding::Utf16Le | Encoding::Utf16Be) && !bytes.len().is_multiple_of(2);
+    Ok((ascii, encoding, halved))
 }
 
 /// The characters of a piece of text: UTF-8 where it is valid, Latin-1 otherwise.
@@ -107,9 +109,6 @@ fn unmarked_utf16(bytes: &[u8]) -> Option<Encoding> {
 }
 
 fn from_utf16(bytes: &[u8], encoding: Encoding, start: usize) -> Result<Vec<u8>, TextError> {
-    if !bytes.len().is_multiple_of(2) {
-        return Err(TextError::Utf16 { offset: start + bytes.len() - 1 });
-    }
     let units = bytes.chunks_exact(2).map(|pair| match encoding {
         Encoding::Utf16Be => u16::from_be_bytes([pair[0], pair[1]]),
         _ => u16::from_le_bytes([pair[0], pair[1]]),

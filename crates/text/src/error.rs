@@ -24,6 +24,20 @@ pub enum TextError {
         /// How many lines were looked at.
         n_lines: usize,
     },
+    /// There is no such block of rows.
+    NoBlock {
+        /// How many there are.
+        n_blocks: usize,
+    },
+    /// There are no such lines.
+    NoLines {
+        /// The first line asked for.
+        first: usize,
+        /// The last line asked for.
+        last: usize,
+        /// How many lines there are, as far as they were counted.
+        n_lines: usize,
+    },
     /// The names row has fewer names than the rows have fields.
     Names {
         /// Line of the names.
@@ -81,6 +95,12 @@ impl fmt::Display for TextError {
                 f,
                 "no rows of numbers in {n_lines} line(s) of text; expected columns separated by comma, semicolon, tab, '|' or spaces"
             ),
+            Self::NoBlock { n_blocks } => {
+                write!(f, "no such block of rows; expected 1 to {n_blocks}")
+            }
+            Self::NoLines { first, last, n_lines } => {
+                write!(f, "no lines {first} to {last}; the file has {n_lines}")
+            }
             Self::Names { line, n_names, data_line, n_fields } => write!(
                 f,
                 "line {line} names {n_names} columns, but line {data_line} has {n_fields} fields; expected one name per \
@@ -103,6 +123,16 @@ impl fmt::Display for TextError {
                 f,
                 "line {line}, column '{column}': expected a date or time like those in the other lines, found {found}"
             ),
+        }
+    }
+}
+
+impl TextError {
+    /// The line that is broken, where one line is.
+    pub fn line(&self) -> Option<usize> {
+        match self {
+            Self::Ragged { line, .. } | Self::NotANumber { line, .. } | Self::NotATime { line, .. } => Some(*line),
+            _ => None,
         }
     }
 }

@@ -34,6 +34,7 @@ const REACH: usize = 5;
 pub(crate) fn read(head: &[HeadLine<'_>], data: &HeadLine<'_>, dialect: &Dialect) -> Result<Header, TextError> {
     let mut rows: Vec<Row> = Vec::new();
     let mut skipped = 0;
+    let mut short_units = None;
     for (at, line) in head.iter().enumerate().rev() {
         if is_blank(line.bytes) || is_rule(line.bytes) {
             continue;
@@ -45,6 +46,9 @@ pub(crate) fn read(head: &[HeadLine<'_>], data: &HeadLine<'_>, dialect: &Dialect
             if rows.len() == 3 {
                 break;
             }
+        } else if rows.is_empty() && row.is_short_of_units(dialect) {
+            // The names stand above it.
+            short_units = Some(row);
         } else if rows.is_empty() {
             skipped += 1;
             // Words divided by blanks are a row of names only close to the numbers: further up they are prose.
@@ -62,6 +66,7 @@ pub(crate) fn read(head: &[HeadLine<'_>], data: &HeadLine<'_>, dialect: &Dialect
         refuse_broken_row(row, &rows, dialect)?;
     }
     let units_at = (rows.len() > 1).then(|| rows.iter().position(Row::is_units)).flatten();
+    let units_at = units_at.or_else(|| (rows.len() > 1 && rows[0].is_units_under(&rows[1])).then_some(0));
     let names_at = match units_at {
         Some(at) if at + 1 < rows.len() => at + 1,
         _ => 0,
@@ -70,6 +75,9 @@ pub(crate) fn read(head: &[HeadLine<'_>], data: &HeadLine<'_>, dialect: &Dialect
         return no_names(closest, data, dialect);
     };
     let units = units_at.filter(|at| at + 1 == names_at).map(|at| rows[at].texts());
+    // Where blanks divide, nobody knows which column has no unit.
+    let short_units = short_units.filter(|_| dialect.delimiter != Delimiter::Blanks);
+    let units = units.or_else(|| short_units.map(|row| row.texts()));
     Ok(Header { names: Some(names.texts()), names_line: names.number, units, note: None })
 }
 
@@ -161,7 +169,7 @@ impl Row {
         let inner = uncommented(&line);
         let comment = inner.is_some();
         let plain = inner.unwrap_or(&line);
-        let cells = cells(plain, dialect.delimiter, n_columns);
+        let cells = cells(plain, dialect);
         let statement = is_statement(plain);
         Self { number: head[at].number, cells, comment, statement }
     }
@@ -191,6 +199,31 @@ impl Row {
         self.cells.iter().map(|c| encoding::text(unquoted(c).trim_ascii()).into_owned()).collect()
     }
 
+    /// A row of units with fewer cells than there are columns.
+    fn is_short_of_units(&self, dialect: &Dialect) -> bool {
+        self.cells.len() < dialect.n_required() && self.cells.len() > 1 && !self.statement && self.is_units()
+    }
+
+    /// Whether this is a row of units under a row of names: short words, of which some are known units, or repeat, or
+    /// are missing, or stand under a name of time, while every one has its own name above it.
+    fn is_units_under(&self, names: &Self) -> bool {
+        let (units, above) = (self.texts(), names.texts());
+        let named = |at: usize| above.get(at).is_some_and(|name| !name.is_empty());
+        let number = |name: &String| crate::number::parse(name.as_bytes(), b'.').is_some();
+        let is_name = |name: &String| !name.is_empty() && !number(name);
+        let distinct = above.iter().enumerate().all(|(at, name)| is_name(name) && !above[..at].contains(name));
+        let filled: Vec<&String> = units.iter().filter(|unit| !unit.is_empty()).collect();
+        let short = filled.iter().all(|unit| is_short_word(unit));
+        let under = (0..units.len()).all(|at| units[at].is_empty() || named(at));
+        if !(distinct && short && under) || filled.is_empty() || units.iter().any(|unit| is_time_name(unit)) {
+            return false;
+        }
+        // Letters may name columns, but seconds.
+        let known = filled.iter().any(|unit| is_unit(unit) && (unit.len() > 1 || *unit == "s"));
+        let repeated = filled.iter().enumerate().any(|(at, unit)| filled[..at].contains(unit));
+        known || repeated || filled.len() < above.len() || above.iter().any(|name| is_time_name(name))
+    }
+
     fn is_units(&self) -> bool {
         let texts = self.texts();
         texts.iter().any(|t| !t.is_empty()) && texts.iter().all(|t| t.is_empty() || is_unit(t))
@@ -198,9 +231,11 @@ impl Row {
 }
 
 /// The cells of a header line; by another delimiter where that gives one cell per column and the rows' own does not.
-fn cells(line: &[u8], delimiter: Delimiter, n_columns: usize) -> Vec<Vec<u8>> {
+fn cells(line: &[u8], dialect: &Dialect) -> Vec<Vec<u8>> {
+    let (delimiter, n_columns) = (dialect.delimiter, dialect.kinds.len());
     let trimmed = |mut cells: Vec<Vec<u8>>| {
-        while cells.len() > 1 && cells.last().is_some_and(Vec::is_empty) {
+        // An empty cell above a column of numbers says that it has no name or unit.
+        while cells.len() > dialect.n_required().max(1) && cells.last().is_some_and(Vec::is_empty) {
             cells.pop();
         }
         cells
@@ -266,6 +301,20 @@ fn is_unit(cell: &str) -> bool {
     let letter = ["t", "k", "l", "j", "w"].contains(&cell.to_lowercase().as_str());
     let none = ["-", "--", "1"].contains(&cell);
     bracketed('(', ')') || bracketed('[', ']') || none || (!letter && unit(cell).is_some())
+}
+
+/// Whether a text is short enough for a unit: two words at most, and no number of its own.
+fn is_short_word(text: &str) -> bool {
+    let number = crate::number::parse(text.as_bytes(), b'.').is_some_and(|value| !value.is_nan());
+    !number && text.chars().count() <= 16 && text.split_whitespace().count() <= 2
+}
+
+/// Whether a cell names the time, in some language, perhaps with its unit.
+fn is_time_name(text: &str) -> bool {
+    const NAMES: [&str; 12] =
+        ["time", "zeit", "temps", "tiempo", "tempo", "t", "время", "时间", "時間", "時刻", "시간", "czas"];
+    let stem = text.split(['(', '[', ',', '/']).next().unwrap_or_default().trim().to_lowercase();
+    NAMES.contains(&stem.as_str()) || stem.starts_with("time ") || stem.ends_with(" time")
 }
 
 /// What messages call a column.

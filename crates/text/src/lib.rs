@@ -12,9 +12,11 @@
 //! # Ok::<(), rthstrack_text::TextError>(())
 //! ```
 //!
-//! Every row counts: a ragged row or a word among numbers is an error with its line, never left out. Every number has
+//! Every row counts: a ragged row or a word among numbers is an error with its line. What is left out (a footer, a
+//! repeated header, a last line that is cut off, other blocks of rows) is told in a note with its line. Every number has
 //! exactly the value that `str::parse::<f64>` gives its token. No input makes this crate panic.
 
+mod blocks;
 mod delimiter;
 mod dialect;
 mod encoding;
@@ -22,6 +24,7 @@ mod error;
 mod header;
 mod line;
 mod number;
+mod repair;
 mod stamp;
 mod table;
 mod unit;
@@ -29,5 +32,5 @@ mod unit;
 pub use delimiter::Delimiter;
 pub use encoding::Encoding;
 pub use error::TextError;
-pub use table::{Column, MISSING_STAMP, Table, Values, read};
+pub use table::{Column, MISSING_STAMP, Note, Part, Table, Values, read, read_part};
 pub use unit::{Quantity, Unit, is_unit_suffix, unit};

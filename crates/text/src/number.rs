@@ -127,6 +127,45 @@ pub(crate) fn parse(token: &[u8], point: u8) -> Option<f64> {
     }
 }
 
+/// The value of a token with marks between groups of three digits: `1,234.5`, `1.234,5`, `1'234.5`, `1 234.5`.
+///
+/// `sure` asks that it cannot be read otherwise: `1,234` may have three decimals.
+pub(crate) fn grouped(token: &[u8], point: u8, sure: bool) -> Option<f64> {
+    // Most tokens end here: one to three digits, no zero first, then a mark that is not the decimal one.
+    let digits = token.strip_prefix(b"-").or_else(|| token.strip_prefix(b"+")).unwrap_or(token);
+    let first = digits.iter().take(4).take_while(|b| b.is_ascii_digit()).count();
+    let mark = *digits.get(first)?;
+    if !(1..=3).contains(&first) || digits[0] == b'0' || mark == point || token.len() > 60 {
+        return None;
+    }
+    if !matches!(mark, b',' | b'.' | b'\'' | b' ' | 0xa0 | 0xc2 | 0xe2) {
+        return None;
+    }
+    // The blanks that typesetters use: without a break, thin, narrow; the first in Latin-1 too.
+    let text: String = match std::str::from_utf8(token) {
+        Ok(text) => text.to_owned(),
+        Err(_) => token.iter().map(|&b| char::from(b)).collect(),
+    };
+    let point = char::from(point);
+    let (whole, decimals) = text.split_once(point).map_or((&*text, None), |(whole, rest)| (whole, Some(rest)));
+    let digits = whole.strip_prefix(['-', '+']).unwrap_or(whole);
+    let mark = digits.chars().find(|c| !c.is_ascii_digit())?;
+    if mark == point || !matches!(mark, ',' | '.' | '\'' | ' ' | '\u{a0}' | '\u{2009}' | '\u{202f}' | '\u{2019}') {
+        return None;
+    }
+    let groups: Vec<&str> = digits.split(mark).collect();
+    let first = groups[0].len();
+    let apart = groups[1..].iter().all(|group| group.len() == 3) && (1..=3).contains(&first);
+    let numeric = groups.iter().all(|group| group.bytes().all(|b| b.is_ascii_digit()));
+    let fraction = decimals.is_none_or(|rest| rest.bytes().all(|b| b.is_ascii_digit()));
+    let doubtful = decimals.is_none() && groups.len() == 2 && matches!(mark, ',' | '.' | ' ');
+    if !(apart && numeric && fraction) || sure && doubtful {
+        return None;
+    }
+    let sign = if whole.starts_with('-') { "-" } else { "" };
+    format!("{sign}{}.{}", groups.concat(), decimals.unwrap_or_default()).parse().ok()
+}
+
 /// `1.5d+03`: the exponent letter of double precision in Fortran.
 fn fortran(text: &str) -> Option<f64> {
     let (digits, power) = text.split_once('d')?;
@@ -138,7 +177,7 @@ fn fortran(text: &str) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{exact, parse};
+    use super::{exact, grouped, parse};
     use proptest::prelude::*;
 
     #[test]
@@ -166,6 +205,27 @@ mod tests {
         for token in ["18446744073709551617", "1844674407370955.1617", "9007199254740993", "0.18446744073709551617e20"]
         {
             assert_eq!(parse(token.as_bytes(), b'.'), token.parse().ok(), "{token}");
+        }
+    }
+
+    #[test]
+    fn marks_between_thousands_are_none_within_numbers() {
+        let cases: [(&str, u8, f64); 7] = [
+            ("1,234.5", b'.', 1234.5),
+            ("-1,234,567", b'.', -1_234_567.0),
+            ("1.234,5", b',', 1234.5),
+            ("1'234.25", b'.', 1234.25),
+            ("1'234", b'.', 1234.0),
+            ("+12 345,5", b',', 12345.5),
+            ("1\u{a0}234.5", b'.', 1234.5),
+        ];
+        for (token, point, value) in cases {
+            assert_eq!(grouped(token.as_bytes(), point, true), Some(value), "{token}");
+        }
+        assert_eq!(grouped(b"1,234", b'.', false), Some(1234.0));
+        assert_eq!(grouped(b"1,234", b'.', true), None);
+        for token in ["0,123.5", "12,34.5", "1,2345", "1,234e5", "1234.5", "1,234.5.6", ",123.5", "1,,234.5"] {
+            assert_eq!(grouped(token.as_bytes(), b'.', false), None, "{token}");
         }
     }
 

@@ -51,6 +51,7 @@ const UNITS: &[(Quantity, f64, &[&str], &[&str])] = &[
     (Length, 1e-2, &["cm", "centimeter", "centimeters", "centimetre", "centimetres"], &["cm"]),
     (Length, 1e-6, &["um", "µm", "micron", "microns"], &["um", "µm"]),
     (Length, 0.0254, &["in", "inch", "inches", "\""], &[]),
+    (Length, 2.54e-5, &["mil", "mils"], &[]),
     (Length, 0.3048, &["ft", "foot", "feet"], &["ft"]),
     (Time, 1.0, &["s", "sec", "secs", "second", "seconds", "sekunden"], &["s"]),
     (Time, 1e-3, &["ms", "msec", "millisecond", "milliseconds"], &["ms"]),
@@ -69,15 +70,20 @@ const UNITS: &[(Quantity, f64, &[&str], &[&str])] = &[
     (Force, 4.448_221_615_260_5, &["lbf", "lb", "lbs"], &["lbf"]),
     (Force, 4_448.221_615_260_5, &["kip", "kips"], &["kip", "kips"]),
     (Force, 9.80665, &["kgf"], &[]),
-    (Voltage, 1.0, &["v"], &["V"]),
+    (Voltage, 1.0, &["v", "volt", "volts"], &["V"]),
     (Voltage, 1e-3, &["mv"], &["mV"]),
     (Voltage, 1e3, &["kv"], &[]),
     (Current, 1.0, &["a"], &["A"]),
     (Current, 1e-3, &["ma"], &["mA"]),
-    (Other, 1.0, &["%", "deg", "°", "°c", "degc", "c", "k", "rad", "mrad"], &["deg", "rad"]),
-    (Other, 1.0, &["pa", "kpa", "mpa", "gpa", "bar", "psi"], &["Pa", "kPa", "MPa", "psi"]),
-    (Other, 1.0, &["nm", "knm", "j", "w", "kw", "kg", "t", "l", "rpm"], &[]),
-    (Other, 1.0, &["strain", "ustrain", "µstrain", "µε", "counts", "bit"], &[]),
+    (
+        Other,
+        1.0,
+        &["%", "deg", "degs", "degree", "degrees", "°", "°c", "degc", "c", "k", "rad", "mrad", "radians"],
+        &["deg", "rad"],
+    ),
+    (Other, 1.0, &["pa", "kpa", "mpa", "gpa", "bar", "psi", "ksi"], &["Pa", "kPa", "MPa", "psi"]),
+    (Other, 1.0, &["nm", "knm", "j", "w", "kw", "kg", "t", "l", "rpm", "gpm", "lpm"], &[]),
+    (Other, 1.0, &["strain", "ustrain", "µstrain", "µε", "microstrain", "counts", "bit", "cycles"], &[]),
 ];
 
 /// The unit that a text is: a spelling of the table, or spellings with powers joined by / * · . ^ or blanks; in

@@ -8,7 +8,7 @@ use std::fs;
 use std::panic::catch_unwind;
 use std::path::Path;
 
-use rthstrack_text::{Values, read};
+use rthstrack_text::{Part, Table, TextError, Values, read, read_part};
 
 /// SplitMix64 (Steele, Lea, Flood 2014).
 struct Chance(u64);
@@ -40,7 +40,7 @@ fn files(folder: &str) -> Vec<Vec<u8>> {
 }
 
 /// Pieces that mean something to the reader.
-const PIECES: [&[u8]; 46] = [
+const PIECES: [&[u8]; 50] = [
     b"\n",
     b"\r\n",
     b"\r",
@@ -87,6 +87,10 @@ const PIECES: [&[u8]; 46] = [
     b"=",
     b":",
     b"***End_of_Header***",
+    b"\x0cPage 2\n",
+    b"1'000.5",
+    b"1,234.5",
+    b"time,x\ns,mm\n",
 ];
 
 fn lines(text: &[u8]) -> Vec<Vec<u8>> {
@@ -156,9 +160,18 @@ fn mutated(seeds: &[Vec<u8>], chance: &mut Chance) -> Vec<u8> {
     text
 }
 
-/// Whatever comes out must fit together.
+/// Whatever comes out must fit together, of the whole text and of parts of it.
 fn check(text: &[u8]) -> bool {
-    match read(text) {
+    let n = text.len() % 7;
+    let parts = [Part { block: Some(n), lines: None }, Part { block: None, lines: Some((n, 3 * n)) }];
+    for part in parts {
+        check_one(read_part(text, part));
+    }
+    check_one(read(text))
+}
+
+fn check_one(found: Result<Table, TextError>) -> bool {
+    match found {
         Ok(table) => {
             for column in &table.columns {
                 match &column.values {

@@ -43,6 +43,7 @@ def add_signals(parser: argparse.ArgumentParser, title: str) -> argparse._Argume
     signals.add_argument(
         "--resample", type=positive, metavar="HZ", help="interpolate uneven time stamps onto this rate"
     )
+    add_part(signals)
     return signals
 
 
@@ -55,6 +56,13 @@ def files_in(paths: Sequence[str]) -> list[str]:
         # LabVIEW's index beside a TDMS file is no recording.
         found += [str(one) for one in inside if one.suffix != ".tdms_index"] or [path]
     return found
+
+
+def add_part(parser: argparse._ActionsContainer) -> None:
+    """Which part of a text file or workbook is read."""
+    part = parser.add_mutually_exclusive_group()
+    part.add_argument("--block", type=count, metavar="N", help="block of rows of a text file, or sheet of a workbook")
+    part.add_argument("--lines", type=lines, metavar="A:B", help="read only these lines of a text file")
 
 
 def chosen(args: argparse.Namespace) -> dict[str, Any]:
@@ -70,6 +78,8 @@ def chosen(args: argparse.Namespace) -> dict[str, Any]:
         "fill": args.fill,
         "start_s": args.start,
         "end_s": args.end,
+        "block": args.block,
+        "lines": args.lines,
     }
 
 
@@ -83,6 +93,10 @@ OPTIONS = {
     "fill": "--fill SAMPLES",
     "unit": "--unit",
     "align": "--align",
+    "start_s": "--start S",
+    "end_s": "--end S",
+    "block": "--block N",
+    "lines": "--lines A:B",
 }
 
 
@@ -137,6 +151,13 @@ def count(text: str) -> int:
     if not text.isascii() or not text.isdigit() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"expected a whole number from 1 on, found '{text}'")
     return int(text)
+
+
+def lines(text: str) -> tuple[int, int]:
+    first, _, last = text.partition(":")
+    if not (first + last).isascii() or not first.isdigit() or not last.isdigit() or not 1 <= int(first) <= int(last):
+        raise argparse.ArgumentTypeError(f"expected two line numbers as 6:605, found '{text}'")
+    return int(first), int(last)
 
 
 def power_of_two(text: str) -> int:

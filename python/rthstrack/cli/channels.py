@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rthstrack.cli.arguments import files_in, told
+from rthstrack.cli.arguments import add_part, files_in, told
 from rthstrack.cli.commands import COMMANDS
 from rthstrack.errors import ChannelError, RecordingError
 from rthstrack.recording.pairing import propose_pair
@@ -31,6 +31,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "target/measured pair. Exit status: 0 all files were read, 1 some file could not be read, 2 misuse.",
     )
     parser.add_argument("files", nargs="+", metavar="FILE", help="file to list, or a folder of files")
+    add_part(parser)
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
     parser.set_defaults(run=run)
 
@@ -41,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     failures: list[dict[str, str]] = []
     for file in files_in(args.files):
         try:
-            listed.append(_listing(file))
+            listed.append(_listing(file, args.block, args.lines))
         except RecordingError as error:
             failures.append({"file": file, "error": told(error)})
         else:
@@ -55,9 +56,9 @@ def run(args: argparse.Namespace) -> int:
     return 1 if failures else 0
 
 
-def _listing(file: str) -> dict[str, Any]:
+def _listing(file: str, block: int | None, lines: tuple[int, int] | None) -> dict[str, Any]:
     """A file as the JSON shows it. A rate that cannot be settled is told, and no reason not to list the channels."""
-    contents = read_contents(file)
+    contents = read_contents(file, block=block, lines=lines)
     problem = None
     try:
         recording = recording_from(contents, file)

@@ -7,10 +7,15 @@ import re
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
 from rthstrack.errors import RecordingError, SettingError, SignalError
 from rthstrack.ground_motion.motion import GroundMotion
 from rthstrack.recording.motion_files import Quantity, read_motion
-from rthstrack.recording.readers.at2 import acceleration_unit
+from rthstrack.recording.readers.at2 import STANDARD_GRAVITY_M_S2, acceleration_unit
+
+# The strongest ground motion ever recorded had less than a fifth of this.
+_MOST_M_S2 = 20 * STANDARD_GRAVITY_M_S2
 
 
 def read_ground_motion(
@@ -31,6 +36,18 @@ def read_ground_motion(
     """
     file = os.fspath(path)
     read = read_motion(path, ACCELERATION, channel=channel, unit=unit, rate_hz=rate_hz, layout=layout)
+    peak = float(np.abs(read.values).max(initial=0.0))
+    if read.values.size > 1 and peak == 0:
+        raise RecordingError(f"{read.channel}: every value is zero; no ground motion", file=file, code="all_zero")
+    if peak > _MOST_M_S2:
+        most, found = (f"{value / STANDARD_GRAVITY_M_S2:.4g} g" for value in (_MOST_M_S2, peak))
+        raise RecordingError(
+            f"{read.channel}: expected at most {most}, found a peak of {found}; is its unit right?",
+            file=file,
+            code="implausible_peak",
+            values=(peak,),
+            advice="give unit",
+        )
     try:
         return GroundMotion(Path(path).stem, read.values, read.rate_hz, read.source, read.notes)
     except SettingError as error:

@@ -51,6 +51,8 @@ def read_chosen(
     fill: int | None = None,
     start_s: float | None = None,
     end_s: float | None = None,
+    block: int | None = None,
+    lines: tuple[int, int] | None = None,
 ) -> ChosenPairs:
     """Reads a file, takes the pairs named or proposes them, fills gaps, puts pairs on one clock, scales and cuts.
 
@@ -60,7 +62,7 @@ def read_chosen(
     """
     file = os.fspath(path)
     checked_rates(rate_hz, resample_hz)
-    contents = read_contents(path)
+    contents = read_contents(path, block=block, lines=lines)
     contents, units, scale = of_time(contents, time, units or {}, scale or {}, file)
     recording = recording_from(contents, file, rate_hz=rate_hz, time=time, resample_hz=resample_hz)
     if recording.rate_hz is None and all(c.time is None or c.time.rate_hz is None for c in recording.channels):
@@ -88,6 +90,7 @@ def read_chosen(
     if recording.rate_hz is None:
         why = f"no sampling rate: {recording.rate_source}"
         raise RecordingError(why, file=file, advice="give {rate_hz} or {time}")
+    _refuse_blank_ends(recording, judged)
     return ChosenPairs(recording, recording.rate_hz, pairs, proposal)
 
 
@@ -301,3 +304,28 @@ def _converted(recording: Recording, target: str, other: str) -> Recording:
     channels[at] = replace(old, unit=wanted, values=frozen(old.values * factor))
     words = f"'{old.name}' converted from {old.unit} to {wanted}, the unit of '{recording.channel(target).name}'"
     return replace(recording, channels=tuple(channels), notes=(*recording.notes, Said(words, "converted", [factor])))
+
+
+def _refuse_blank_ends(recording: Recording, selectors: Sequence[str]) -> None:
+    """Where a channel begins or ends with nothing, no gap can be filled: what is left is told, to be cut to."""
+    for selector in selectors:
+        channel = recording.channel(selector)
+        known = np.flatnonzero(np.isfinite(channel.values))
+        n_before, n_after = (int(known[0]), len(channel.values) - 1 - int(known[-1])) if known.size else (0, 0)
+        if not n_before and not n_after:
+            continue
+        assert recording.rate_hz is not None
+        first, end = n_before / recording.rate_hz, (len(channel.values) - n_after) / recording.rate_hz
+        where = " and ".join(
+            f"{n} sample(s) at the {place}" for n, place in ((n_before, "start"), (n_after, "end")) if n
+        )
+        cut = " and ".join(
+            f"{{{key}}} = {at:g}" for n, key, at in ((n_before, "start_s", first), (n_after, "end_s", end)) if n
+        )
+        raise RecordingError(
+            f"channel '{channel.path}' is blank or not finite in {where}",
+            file=recording.file,
+            code="blank_ends",
+            values=(first, end),
+            advice=f"cut there: {cut} s",
+        )

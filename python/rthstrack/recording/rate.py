@@ -74,7 +74,8 @@ class TimeColumn:
 _HINTS = re.compile(r"tick|clock|count|date|stamp", re.IGNORECASE)
 _TIME_NAMES = re.compile(
     r"t|times?|tout|zeit|messzeit|temps|tiempo|tempo|x[_ ]values?|time[ _-]?stamps?|time[ _-]?(?:axis|vector|base|\d+)|"
-    r"(?:elapsed|running|relative|test|total|run|sample|measurement|record|simulation|sim)[ _-]?time",
+    r"(?:elapsed|running|relative|test|total|run|sample|measurement|record|simulation|sim)[ _-]?time|"
+    "tijd|tid|czas|zaman|aika|čas|время|час|χρόνος|時間|时间|時刻|时刻|経過時間|시간|समय|الزمن|الوقت|זמן",
     re.IGNORECASE,
 )
 
@@ -123,10 +124,13 @@ def _time_named(series: Series, unit_s: float | None) -> str:
 def _is_time(series: Series, unit_s: float | None) -> bool:
     """Time by its name; a name that means other things too (T, Time 1) needs a unit of time or rising values."""
     named = _time_named(series, unit_s)
-    if named != "loosely":
-        return named == "plainly"
     values = ended(series.values)
-    return len(values) > 1 and bool(np.all(np.diff(values) > 0))
+    if named == "plainly":
+        return True
+    if named == "loosely":
+        return len(values) > 1 and bool(np.all(np.diff(values) > 0))
+    # Whatever its name: what rises evenly in a unit of time is time.
+    return unit_s is not None and len(values) > 3 and isinstance(examine(values, unit_s), Uniform)
 
 
 def ended(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -29,18 +29,22 @@ def read_recording(
     rate_hz: float | None = None,
     time: str | None = None,
     resample_hz: float | None = None,
+    block: int | None = None,
+    lines: tuple[int, int] | None = None,
 ) -> Recording:
     """Reads a file of any known format, chosen by its content.
 
     The sampling rate comes from the first of: `rate_hz`; the channel named by `time`; a statement in the file; a time
     column known by its name; a column of dates or times of day. It may stay None. Channels that have a time of their
     own carry it (`Channel.time`); `on_one_clock` puts some on one. `resample_hz` interpolates every channel from its
-    time stamps onto a uniform grid (cubic, without a low-pass).
+    time stamps onto a uniform grid (cubic, without a low-pass). `block` (from 1) chooses among the blocks of rows of a
+    text file or the sheets of a workbook; `lines`, the first and the last, are those that are read.
     Raises RecordingError if the file cannot be read, if time stamps are not uniform, or if two statements of the rate
     differ by more than 1 %; ChannelError for `time`; SettingError for a rate that is not positive.
     """
     checked_rates(rate_hz, resample_hz)
-    return recording_from(read_contents(path), os.fspath(path), rate_hz=rate_hz, time=time, resample_hz=resample_hz)
+    contents = read_contents(path, block=block, lines=lines)
+    return recording_from(contents, os.fspath(path), rate_hz=rate_hz, time=time, resample_hz=resample_hz)
 
 
 def checked_rates(rate_hz: float | None, resample_hz: float | None) -> None:

@@ -73,6 +73,8 @@ def read_pairs(
     fill: int | None = None,
     start_s: float | None = None,
     end_s: float | None = None,
+    block: int | None = None,
+    lines: tuple[int, int] | None = None,
 ) -> list[Pair]:
     """The pairs of a recorded test, or of a configuration (.toml), which is simulated: one an actuator.
 
@@ -95,6 +97,8 @@ def read_pairs(
         fill=fill,
         start_s=start_s,
         end_s=end_s,
+        block=block,
+        lines=lines,
     )
     found = []
     for actuator, (asked, answered) in enumerate(channels):

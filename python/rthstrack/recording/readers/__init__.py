@@ -13,7 +13,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from rthstrack.errors import RecordingError, printable
+from rthstrack.errors import RecordingError, SettingError, printable
+from rthstrack.recording.readers.contents import WHOLE, Part
 
 if TYPE_CHECKING:
     from rthstrack.recording.readers.contents import Contents
@@ -34,7 +35,7 @@ class Beginning(NamedTuple):
 class Format(NamedTuple):
     """A file format: its name and what help calls it, its module, usual endings, and how it is recognised.
 
-    `module` has a function `reader` (path) -> Contents.
+    `module` has a function `reader` (path) -> Contents, or (path, part) where the format `has_parts`.
     """
 
     name: str
@@ -43,10 +44,17 @@ class Format(NamedTuple):
     endings: tuple[str, ...]
     recognises: Callable[[Beginning], bool]
     reader: str = "read"
+    has_parts: bool = False
 
-    def read(self, file: Path) -> Contents:
-        """Everything in a file of this format."""
-        found: Contents = getattr(import_module(f"{__name__}.{self.module}"), self.reader)(file)
+    def read(self, file: Path, part: Part = WHOLE) -> Contents:
+        """Everything in a file of this format, or a part of it."""
+        if part != WHOLE and not self.has_parts:
+            formats = " and ".join(dict.fromkeys(one.called for one in FORMATS if one.has_parts))
+            raise RecordingError(
+                f"block and lines choose a part of {formats} files; this one is {self.name}", code="no_parts"
+            )
+        read = getattr(import_module(f"{__name__}.{self.module}"), self.reader)
+        found: Contents = read(file, part) if self.has_parts else read(file)
         return found
 
 
@@ -56,6 +64,18 @@ def _is_at2(b: Beginning) -> bool:
     return at2.recognised(b.file)
 
 
+def _is_accelerogram(b: Beginning) -> bool:
+    from rthstrack.recording.readers import accelerograms
+
+    return accelerograms.kind(b.head) is not None
+
+
+def _is_workbook(b: Beginning) -> bool:
+    from rthstrack.recording.readers import excel
+
+    return b.starts(b"\xd0\xcf\x11\xe0") or (b.starts(b"PK\3\4") and excel.recognised(b.file))
+
+
 def _is_matlab(b: Beginning) -> bool:
     return not b.is_hdf5 and (b.starts(b"MATLAB 5.0") or b.head[126:128] in (b"IM", b"MI") or _is_mat4(b.head))
 
@@ -63,16 +83,31 @@ def _is_matlab(b: Beginning) -> bool:
 #: Every format, in the order in which they are looked for: the last is what no other is.
 FORMATS = (
     Format("MATLAB", "MATLAB", "mat", (".mat",), _is_matlab),
-    Format("MATLAB v7.3", "MATLAB", "mat73", (".mat",), lambda b: b.starts(b"MATLAB 7")),
+    Format(
+        "MATLAB v7.3",
+        "MATLAB",
+        "mat73",
+        (".mat",),
+        lambda b: b.starts(b"MATLAB 7", *([b"MATLAB"] if b.is_hdf5 else [])),
+    ),
     Format("HDF5", "HDF5", "hdf5", (".h5", ".hdf5", ".hdf", ".he5"), lambda b: b.is_hdf5),
     Format("TDMS", "TDMS", "tdms", (".tdms",), lambda b: b.starts(b"TDSm")),
     Format("Parquet", "Parquet", "parquet", (".parquet", ".pq"), lambda b: b.starts(b"PAR1")),
     Format("Arrow stream", "Arrow", "arrow", (".arrows", ".arrow"), lambda b: b.starts(b"\xff\xff\xff\xff")),
     Format("Arrow file", "Arrow", "arrow", (".arrow", ".feather"), lambda b: b.starts(b"ARROW1\0\0")),
     Format("NumPy npy", "NumPy", "numpy_file", (".npy",), lambda b: b.starts(b"\x93NUMPY"), "read_npy"),
+    Format("Excel", "Excel", "excel", (".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"), _is_workbook, has_parts=True),
     Format("NumPy npz", "NumPy", "numpy_file", (".npz",), lambda b: b.starts(b"PK\3\4", b"PK\5\6"), "read_npz"),
+    Format("accelerogram", "text", "accelerograms", (), _is_accelerogram),
     Format("PEER AT2", "text", "at2", (".at2",), _is_at2),
-    Format("text", "text", "text", (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm", ".prn", ".out"), lambda _: True),
+    Format(
+        "text",
+        "text",
+        "text",
+        (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm", ".prn", ".out"),
+        lambda _: True,
+        has_parts=True,
+    ),
 )
 _TEXT = FORMATS[-1]
 #: What they are called in help and messages: text first.
@@ -80,7 +115,10 @@ FORMAT_NAMES = tuple(dict.fromkeys(("text", *(one.called for one in FORMATS))))
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _RECORDING_WARNINGS = threading.Lock()
 _OTHERS = (
-    (b"\xd0\xcf\x11\xe0", "an old Excel or Office file; save the sheet as CSV"),
+    (
+        b"version https://git-lfs.github.com/spec/",
+        "a Git LFS pointer, which stands for the file; fetch the file itself with 'git lfs pull'",
+    ),
     (b"\x1f\x8b", "a gzip archive; unpack it first"),
     (b"TDSh", "the index of a TDMS file; give the .tdms file beside it"),
     (b"7z\xbc\xaf", "a 7z archive; unpack it first"),
@@ -90,24 +128,29 @@ _OTHERS = (
 )
 
 
-def read_contents(path: str | os.PathLike[str]) -> Contents:
-    """Reads everything in a file, whatever its format.
+def read_contents(
+    path: str | os.PathLike[str], *, block: int | None = None, lines: tuple[int, int] | None = None
+) -> Contents:
+    """Reads everything in a file, whatever its format; of text and workbooks a block of rows (from 1) or some lines.
 
     Raises RecordingError, one line with the file's name: missing, empty, damaged, of an unknown format, or without
-    channels. This is the one place where a library's own exceptions end.
+    channels, or a part of what has none. This is the one place where a library's own exceptions end.
     """
+    part = Part(block, lines)
+    if block is not None and lines is not None:
+        raise SettingError("block and lines exclude each other")
     file = Path(path)
     try:
         found = _format(file)
         if found is _TEXT:
-            contents, caught = _read_text(file), []
+            contents, caught = _read_text(file, part), []
         else:
             # The interpreter has one list of warning filters: whoever records warnings must be alone.
             with _RECORDING_WARNINGS, warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always")
-                contents = found.read(file)
+                contents = found.read(file, part)
     except RecordingError as error:
-        raise _error(path, error) from error.__cause__
+        raise _error(path, Exception.__str__(error), error) from error.__cause__
     except OSError as error:
         raise _error(path, error.strerror or _first_line(error)) from error
     except ImportError as error:
@@ -124,7 +167,7 @@ def read_contents(path: str | os.PathLike[str]) -> Contents:
         said = "; ".join(notes[:3]) or "nothing of the kind"
         raise _error(path, f"no channels; expected vectors of numbers ({contents.format}), found: {said}")
     ending = file.suffix.lower()
-    if any(ending in one.endings for one in FORMATS) and ending not in found.endings:
+    if any(ending in one.endings for one in FORMATS) and found.endings and ending not in found.endings:
         notes.append(f"named {file.suffix}, but the content is {contents.format}")
     return replace(
         contents,
@@ -134,11 +177,13 @@ def read_contents(path: str | os.PathLike[str]) -> Contents:
     )
 
 
-def _error(path: str | os.PathLike[str], what: object) -> RecordingError:
-    """One printable line that begins with the file."""
+def _error(path: str | os.PathLike[str], what: object, error: RecordingError | None = None) -> RecordingError:
+    """One printable line that begins with the file; code, values and advice are those of the error it stands for."""
     file, words = printable(os.fspath(path)), printable(str(what))
-    room = max(1000 - len(f"{file}: "), 3)
-    return RecordingError(words if len(words) <= room else words[: room - 3] + "...", file=file)
+    code, values, advice = (error.code, error.values, error.advice) if error else (None, None, "")
+    room = max(1000 - len(f"{file}: ") - len(advice), 3)
+    words = words if len(words) <= room else words[: room - 3] + "..."
+    return RecordingError(words, file=file, code=code, values=values, advice=advice)
 
 
 def _first_line(cause: object) -> str:
@@ -151,15 +196,16 @@ def _summed(notes: list[str]) -> list[str]:
     """The notes, each once, and one for all of whom the same is to be said."""
     alike: dict[str, list[str]] = {}
     for note in dict.fromkeys(notes):
-        name, mark, rest = note.rpartition("' ")
-        alike.setdefault(rest if mark and name.startswith("'") else note, []).append(name + "'")
+        _, mark, rest = note.rpartition("' ")
+        alike.setdefault(rest if mark and note.startswith("'") else note, []).append(note)
     said = []
-    for rest, names in alike.items():
-        if rest in notes:
-            said.append(rest)
+    for rest, group in alike.items():
+        if len(group) == 1:
+            said += group
         else:
+            names = [note.rpartition("' ")[0] + "'" for note in group]
             listed = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
-            said.append(f"{listed} {rest}" if len(names) == 1 else f"{listed}: each {rest}")
+            said.append(f"{listed}: each {rest}")
     return said
 
 
@@ -183,16 +229,18 @@ def _format(file: Path) -> Format:
     return next(one for one in FORMATS if one.recognises(beginning))
 
 
-def _read_text(file: Path) -> Contents:
+def _read_text(file: Path, part: Part) -> Contents:
     """What no signature tells is text; a name that promises something else is told where it is none."""
     named = next((one for one in FORMATS if one is not _TEXT and file.suffix.lower() in one.endings), None)
     try:
-        return _TEXT.read(file)
+        return _TEXT.read(file, part)
     except RecordingError as error:
         if named is None:
             raise
-        what = f"named {file.suffix}, but it does not begin as {named.name} does, and as text: {error}"
-        raise RecordingError(what) from None
+        what = (
+            f"named {file.suffix}, but it does not begin as {named.name} does, and as text: {Exception.__str__(error)}"
+        )
+        raise RecordingError(what, code=error.code, values=error.values, advice=error.advice) from None
 
 
 def _hdf5_behind_a_block(seek: Callable[[int], int], read: Callable[[int], bytes]) -> bool:

@@ -23,10 +23,13 @@ STANDARD_GRAVITY_M_S2 = 9.80665
 # The header has four lines; a file may have one or two of its owner's before them.
 _HEADER_LINES = 10
 _NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eEdD][-+]?\d+)?"
-_SIZES = re.compile(r"\bNPTS\b.*\bDT\b", re.IGNORECASE)
+_SIZES = re.compile(r"\bNPTS\b.*\bDT\b|\bDT\b.*\bNPTS\b", re.IGNORECASE)
 _QUANTITY = re.compile(r"\bUNITS?\b|\b(?:ACCEL|VELOC|DISPL)", re.IGNORECASE)
 _NAMED_SIZES = re.compile(
     rf"\s*NPTS\s*[=:]\s*(?P<n>\d{{1,9}})\s*[,;]?\s*DT\s*[=:]\s*(?P<dt>{_NUMBER})\s*(?P<unit>[a-z]*)", re.IGNORECASE
+)
+_STEP_FIRST = re.compile(
+    rf"\s*DT\s*[=:]\s*(?P<dt>{_NUMBER})\s*(?P<unit>[a-z]*?)\s*[,;]?\s*NPTS\s*[=:]\s*(?P<n>\d{{1,9}})", re.IGNORECASE
 )
 _SIZES_NAMED_BEHIND = re.compile(rf"\s*(?P<n>\d{{1,9}})[\s,;]+(?P<dt>{_NUMBER})[\s,;]+NPTS\s*,?\s*DT", re.IGNORECASE)
 
@@ -102,7 +105,7 @@ def numbers(lines: list[str], start: int) -> NDArray[np.float64]:
 
 def _sizes(line: str, at: int) -> tuple[int, float]:
     """Number of values and time step in seconds, from `NPTS= n, DT= s SEC` or `n s NPTS, DT`."""
-    found = _NAMED_SIZES.match(line) or _SIZES_NAMED_BEHIND.match(line)
+    found = _NAMED_SIZES.match(line) or _STEP_FIRST.match(line) or _SIZES_NAMED_BEHIND.match(line)
     unit = (found.groupdict().get("unit") or "s").lower() if found else ""
     n, step_s = (int(found["n"]), float(re.sub("[dD]", "e", found["dt"]))) if found else (0, math.nan)
     if unit not in ("s", "sec", "secs", "second", "seconds") or n < 2 or not 1e-9 < step_s < 1e9:

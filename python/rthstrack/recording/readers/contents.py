@@ -13,6 +13,17 @@ if TYPE_CHECKING:
 STARTS = ("t0", "t_0", "tstart", "t_start", "start_s", "start_time", "starttime", "x0", "wf_start_offset")
 
 
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Which part of a text file or workbook is read: a block of rows (a sheet), from 1; the first and the last line."""
+
+    block: int | None = None
+    lines: tuple[int, int] | None = None
+
+
+WHOLE = Part()
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Series:
     """One column of numbers (n_samples,). `unit` is what the file states apart from the name.

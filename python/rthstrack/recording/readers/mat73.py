@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
 
 from rthstrack.errors import RecordingError
+from rthstrack.recording.readers import mat
 from rthstrack.recording.readers.hdf5 import check_size
-from rthstrack.recording.readers.matlab import Cell, Opaque, Struct, contents
+from rthstrack.recording.readers.matlab import Cell, Opaque, Struct, contents, has_objects
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -26,7 +29,13 @@ def read(path: Path) -> Contents:
         raise RecordingError("a MATLAB v7.3 file without the HDF5 content behind its header; it is truncated")
     with h5py.File(path, "r") as file:
         names = [name for name in file if not name.startswith("#")]
-        return contents("MATLAB v7.3", {name: _node(file, file.get(name), 0) for name in names})
+        nodes = {name: _node(file, file.get(name), 0) for name in names}
+    found = contents("MATLAB v7.3", nodes)
+    if find_spec("matio") is not None and any(map(has_objects, nodes.values())):
+        # What cannot be read as an object is told as above.
+        with contextlib.suppress(RecordingError):
+            return mat.read(path)
+    return found
 
 
 def _class(item: Any) -> str:

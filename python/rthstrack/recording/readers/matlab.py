@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from rthstrack.recording.readers.arrays import columns, rate_of
 from rthstrack.recording.readers.contents import STARTS, Contents, RateStatement, Series
+from rthstrack.said import Said
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -41,7 +43,32 @@ class Opaque:
     is_object: bool
 
 
-Node: TypeAlias = "NDArray[Any] | str | Struct | Cell | Opaque"
+@dataclass(frozen=True, slots=True, eq=False)
+class Table:
+    """Named columns with their units; `label` is what the whole is called in its file."""
+
+    columns: Sequence[tuple[str, Node, str | None]]
+    label: str | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Object:
+    """An object of a class that is not known: its properties may hold what is."""
+
+    what: str
+    fields: Mapping[str, Node]
+
+
+Node: TypeAlias = "NDArray[Any] | str | Struct | Cell | Opaque | Table | Object"
+
+
+def has_objects(node: Node) -> bool:
+    """Whether an object that cannot be read is in it."""
+    if isinstance(node, Struct):
+        return any(has_objects(one) for fields in node.elements for one in fields.values())
+    if isinstance(node, Cell):
+        return any(map(has_objects, node.elements))
+    return isinstance(node, Opaque) and node.is_object
 
 
 def contents(form: str, variables: Mapping[str, Node]) -> Contents:
@@ -49,7 +76,7 @@ def contents(form: str, variables: Mapping[str, Node]) -> Contents:
     walk = _Walk([], [], [])
     for name, node in variables.items():
         walk.visit(name, node, None, None, 0)
-    objects = [note for note in walk.notes if "MATLAB object" in note]
+    objects = list(filter(_is_unread, walk.notes))
     # What cannot be read is the first thing to say where nothing else was found.
     notes = objects + [note for note in walk.notes if note not in objects]
     one_matrix = len(variables) == 1 and isinstance(next(iter(variables.values())), np.ndarray)
@@ -78,6 +105,19 @@ class _Walk:
                 self.visit(f"{name}{{{i + 1}}}", element, None, None, depth + 1)
         elif isinstance(node, Opaque):
             self.notes.append(_not_read(name, node))
+        elif isinstance(node, Table):
+            for key, column, column_unit in node.columns:
+                about = node.label if key != "Time" and len(node.columns) <= 2 else None
+                self.visit(f"{name}.{key}", column, about, column_unit, depth + 1)
+        elif isinstance(node, Object):
+            # What a class keeps beside its signals is nobody's concern.
+            inner = _Walk(self.series, [], [])
+            n_before = len(self.series)
+            inner.fields(name, node.fields, depth)
+            if len(self.series) == n_before:
+                self.notes.append(_not_read(name, Opaque(node.what, True)))
+            else:
+                self.notes.extend(filter(_is_unread, inner.notes))
         elif isinstance(node, np.ndarray):
             self.array(name, node, label, unit)
 
@@ -119,6 +159,10 @@ def _start(fields: Mapping[str, Node]) -> float | None:
     return None
 
 
+def _is_unread(note: str) -> bool:
+    return isinstance(note, Said) and note.code == "unread_object"
+
+
 def _not_read(name: str, node: Opaque) -> str:
     if not node.is_object:
         return f"'{name}' is {node.what}, no channel"
@@ -127,6 +171,11 @@ def _not_read(name: str, node: Opaque) -> str:
         "table": f"save table2struct({name},'ToScalar',true)",
         "timetable": f"save table2struct(timetable2table({name}),'ToScalar',true)",
         "Simulink.SimulationData.Dataset": f"save {name}{{1}}.Values.Time and {name}{{1}}.Values.Data",
+        "Simulink.SimulationOutput": f"save {name}.tout and {name}.yout{{1}}.Values.Data",
     }
     way = ways.get(node.what, "save its numbers as plain arrays or structs")
-    return f"'{name}' is a MATLAB object ({node.what}), which only MATLAB can read; {way} instead"
+    if find_spec("matio") is None:
+        why = f"which needs the package mat-io (pip install 'rthstrack[matlab]'); or {way}"
+    else:
+        why = f"which only MATLAB can read; {way} instead"
+    return Said(f"'{name}' is a MATLAB object ({node.what}), {why}", "unread_object")

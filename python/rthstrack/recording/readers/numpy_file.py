@@ -29,8 +29,7 @@ def read_npz(path: Path) -> Contents:
     with zipfile.ZipFile(path) as archive:
         members = [name for name in archive.namelist() if name.endswith(".npy")]
         if not members:
-            kind = "an Excel workbook; save the sheet as CSV" if "[Content_Types].xml" in archive.namelist() else "none"
-            raise RecordingError(f"a zip archive; expected NumPy arrays in it (npz), found {kind}")
+            raise RecordingError("a zip archive; expected NumPy arrays in it (npz) or a workbook, found neither")
     entries = []
     with np.load(path, allow_pickle=False) as arrays:
         for name in arrays.files:

@@ -12,7 +12,8 @@ import numpy as np
 from rthstrack._core import read_text as core_read_text
 from rthstrack.errors import RecordingError
 from rthstrack.recording.readers.arrays import tidy
-from rthstrack.recording.readers.contents import Clock, Contents, RateStatement, Series
+from rthstrack.recording.readers.contents import WHOLE, Clock, Contents, Part, RateStatement, Series
+from rthstrack.said import Said
 from rthstrack.units import size_in_si
 
 if TYPE_CHECKING:
@@ -49,15 +50,25 @@ def _statement(key: str, mark: str) -> re.Pattern[str]:
     )
 
 
-def read(path: Path) -> Contents:
+def read(path: Path, part: Part = WHOLE) -> Contents:
     """Reads a text file: comma, semicolon, tab, bar or blanks between columns, with any preamble."""
+    return contents_of(path.read_bytes(), part)
+
+
+def contents_of(content: bytes, part: Part = WHOLE) -> Contents:
+    """The contents of a text, given as its bytes."""
     try:
-        table = core_read_text(path.read_bytes())
+        table = core_read_text(content, part.block, part.lines)
     except ValueError as error:
-        raise RecordingError(str(error)) from None
+        words, line = error.args
+        if line is None:
+            raise RecordingError(words) from None
+        raise RecordingError(
+            words, code="broken_row", values=(line,), advice="or read only lines that are whole: {lines}"
+        ) from None
     series: list[Series] = []
     clocks: list[Clock] = []
-    notes: list[str] = list(table["notes"])
+    notes: list[str] = [Said(*note) for note in table["notes"]]
     nameless = True
     for index, name, unit, kind, values in table["columns"]:
         nameless &= name is None
