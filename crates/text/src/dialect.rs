@@ -65,18 +65,24 @@ impl Dialect {
 }
 
 fn kind(field: &[u8], point: u8) -> Kind {
+    kind_and_grouped(field, point).0
+}
+
+/// What a field holds, and whether it is a number only as thousands are set apart.
+fn kind_and_grouped(field: &[u8], point: u8) -> (Kind, bool) {
     let token = unquoted(field);
-    if token.is_empty() {
+    let kind = if token.is_empty() {
         Kind::Nothing
     } else if number::parse(&token, point).is_some() {
         Kind::Number
     } else if stamp::parse(&token, Order::MonthFirst).is_some() || stamp::parse(&token, Order::DayFirst).is_some() {
         Kind::Stamp
     } else if number::grouped(&token, point, true).is_some() {
-        Kind::Number
+        return (Kind::Number, true);
     } else {
         Kind::Text
-    }
+    };
+    (kind, false)
 }
 
 /// The dialect that explains most of the text as numbers and stamps, or None where hardly any of it is.
@@ -165,12 +171,11 @@ fn judge(lines: &[&[u8]], delimiter: Delimiter, point: u8) -> Option<(f64, Diale
         share_sum += share;
         let mut column = 0;
         each_field(line, delimiter, |field| {
-            match kind(field, point) {
+            let (kind, is_grouped) = kind_and_grouped(field, point);
+            grouped |= is_grouped;
+            match kind {
                 Kind::Nothing => {}
-                Kind::Number => {
-                    counts[column][0] += weight;
-                    grouped |= number::parse(&unquoted(field), point).is_none();
-                }
+                Kind::Number => counts[column][0] += weight,
                 Kind::Stamp => {
                     counts[column][1] += weight;
                     let token = unquoted(field);

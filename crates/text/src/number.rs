@@ -130,6 +130,8 @@ pub(crate) fn parse(token: &[u8], point: u8) -> Option<f64> {
 /// The value of a token with marks between groups of three digits: `1,234.5`, `1.234,5`, `1'234.5`, `1 234.5`.
 ///
 /// `sure` asks that it cannot be read otherwise: `1,234` may have three decimals.
+#[cold]
+#[inline(never)]
 pub(crate) fn grouped(token: &[u8], point: u8, sure: bool) -> Option<f64> {
     // Most tokens end here: one to three digits, no zero first, then a mark that is not the decimal one.
     let digits = token.strip_prefix(b"-").or_else(|| token.strip_prefix(b"+")).unwrap_or(token);
@@ -138,7 +140,9 @@ pub(crate) fn grouped(token: &[u8], point: u8, sure: bool) -> Option<f64> {
     if !(1..=3).contains(&first) || digits[0] == b'0' || mark == point || token.len() > 60 {
         return None;
     }
-    if !matches!(mark, b',' | b'.' | b'\'' | b' ' | 0xa0 | 0xc2 | 0xe2) {
+    let group = &digits[first + 1..];
+    let three = group.iter().take(4).take_while(|b| b.is_ascii_digit()).count() == 3;
+    if !matches!(mark, 0xc2 | 0xe2) && !(three && matches!(mark, b',' | b'.' | b'\'' | b' ' | 0xa0)) {
         return None;
     }
     // The blanks that typesetters use: without a break, thin, narrow; the first in Latin-1 too.
