@@ -145,6 +145,10 @@ pub(crate) fn grouped(token: &[u8], point: u8, sure: bool) -> Option<f64> {
     if !matches!(mark, 0xc2 | 0xe2) && !(three && matches!(mark, b',' | b'.' | b'\'' | b' ' | 0xa0)) {
         return None;
     }
+    let numeric = |b: &u8| b.is_ascii_digit() || matches!(b, b',' | b'.' | b'\'' | b' ' | 0x80..);
+    if !digits.iter().all(numeric) {
+        return None;
+    }
     // The blanks that typesetters use: without a break, thin, narrow; the first in Latin-1 too.
     let text: String = match std::str::from_utf8(token) {
         Ok(text) => text.to_owned(),
