@@ -107,6 +107,8 @@ def test_what_a_unit_measures_tells_what_a_channel_is(tmp_path: Path, units: str
 def proposed(unit: str) -> str | None:
     """By which partner a channel of this unit finds, among one of each kind: what it is taken for."""
     kinds = {"displacement": "m", "force": "N", "acceleration": "g", "velocity": "m/s", "voltage": "V"}
+    # Volts beside a displacement may be a pair, too: of unlike units.
+    kinds = {"voltage": "V"} if unit in CURRENTS.split() else kinds
     rng = np.random.default_rng(1)
     for kind, one in kinds.items():
         units = {"alpha_target": unit, "alpha_measured": one}

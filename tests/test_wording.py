@@ -134,6 +134,8 @@ def test_nothing_in_the_package_branches_on_wording() -> None:
     asked = {}
     for path in sorted(PACKAGE.rglob("*.py")):
         module = path.relative_to(PACKAGE).as_posix()
+        if module.startswith("recording/readers/"):
+            continue  # what a reader asks is the words of a file
         for line, literal in found(path.read_text(encoding="utf-8")):
             asked.setdefault((module, literal), line)
     new = [

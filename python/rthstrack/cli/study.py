@@ -43,9 +43,9 @@ their error against the truth where it is known, their change from P = Q = 1, an
 time. By default the grids of Guo, Xu and Chen (2014): P and Q each alone from 1 to 512, and
 combined up to P = 64 and Q = 32. A positive delay means that measured lags.
 
-A SOURCE is a recorded test ({", ".join(FORMAT_NAMES)}), a run that `rthstrack
-simulate` wrote, or a configuration (.toml), which is simulated first. Runs and configurations
-bring the truth with them.
+A SOURCE is a recorded test ({", ".join(FORMAT_NAMES)}), a run
+that `rthstrack simulate` wrote, or a configuration (.toml), which is simulated first. Runs and
+configurations bring the truth with them.
 """
 _EPILOG = """\
 examples:

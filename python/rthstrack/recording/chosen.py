@@ -107,6 +107,8 @@ def read_two(
     fill: int | None = None,
     start_s: float | None = None,
     end_s: float | None = None,
+    block: int | None = None,
+    lines: tuple[int, int] | None = None,
 ) -> ChosenPairs:
     """Target out of one file, measured out of another, each given as (file, channel), on the clock they have in common.
 
@@ -117,7 +119,7 @@ def read_two(
     sides: list[tuple[Channel, str, Recording]] = []
     from_ns, units, scale = 0, dict(units or {}), dict(scale or {})
     for file, selector in (target, measured):
-        contents = read_contents(file)
+        contents = read_contents(file, block=block, lines=lines)
         contents, units, scale = of_time(contents, time, units, scale, file, lenient=True)
         recording = recording_from(contents, file, rate_hz=rate_hz, time=time, resample_hz=resample_hz)
         channel = recording.channel(selector)
