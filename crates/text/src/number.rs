@@ -142,8 +142,8 @@ pub(crate) fn grouped(token: &[u8], point: u8, sure: bool) -> Option<f64> {
     }
     let group = &digits[first + 1..];
     let three = group.iter().take(4).take_while(|b| b.is_ascii_digit()).count() == 3;
-    let is_mark = matches!(mark, 0xc2 | 0xe2) || (three && matches!(mark, b',' | b'.' | b'\'' | b' ' | 0xa0));
-    if !is_mark {
+    let one_byte = three && matches!(mark, b',' | b'.' | b'\'' | b' ' | 0xa0);
+    if !one_byte && !matches!(mark, 0xc2 | 0xe2) {
         return None;
     }
     let numeric = |b: &u8| b.is_ascii_digit() || matches!(b, b',' | b'.' | b'\'' | b' ' | 0x80..);
