@@ -349,6 +349,12 @@ pub trait Configuration: Default + 'static {
         rows
     }
 
+    /// The names of all settings, its own first.
+    fn names() -> impl Iterator<Item = &'static str> {
+        let shared = Self::Inner::TABLE.iter().filter(|setting| setting.concerns & Self::CONCERNS != 0);
+        Self::TABLE.iter().map(|setting| setting.name).chain(shared.map(|setting| setting.name))
+    }
+
     /// A setting's value; `None` where there is no setting of this name.
     fn get(&self, name: &str) -> Option<Value> {
         if let Some(setting) = Self::TABLE.iter().find(|setting| setting.name == name) {
@@ -392,14 +398,14 @@ impl Configuration for () {
 }
 
 /// A configuration from entries, what is left out by default; and everything that is wrong with them.
-pub fn read<C: Configuration>(entries: impl IntoIterator<Item = (String, Value)>) -> (C, Vec<Error>) {
+pub fn read<C: Configuration, N: AsRef<str>>(entries: impl IntoIterator<Item = (N, Value)>) -> (C, Vec<Error>) {
     let (mut config, mut errors) = (C::default(), Vec::new());
     for (name, value) in entries {
-        match config.set(&name, &value) {
+        match config.set(name.as_ref(), &value) {
             Some(read) => errors.extend(read.err()),
             None => {
-                let known = C::rows().iter().map(|row| row.name).collect::<Vec<_>>().join(", ");
-                errors.push(Error::UnknownSetting { name, known });
+                let known = C::names().collect::<Vec<_>>().join(", ");
+                errors.push(Error::UnknownSetting { name: name.as_ref().to_owned(), known });
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyFloat, PyList, PyMapping, PyString, PyTuple};
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyMapping, PyString, PyTuple};
 use rthstrack::setting::{Configuration, Kind, Row, Value, concerns, read};
 use rthstrack::{Error, EvaluatorConfig, MonitorConfig, MovingConfig};
 use rthstrack_live::alarm::AlarmConfig;
@@ -57,16 +57,14 @@ fn object<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
 
 /// A configuration from a mapping, or from the attributes of an object that has them all; and what is wrong with it.
 pub(crate) fn read_all<C: Configuration>(given: &Bound<'_, PyAny>) -> PyResult<(C, Vec<Error>)> {
+    let Ok(mapping) = given.cast::<PyMapping>() else {
+        let named = |name: &'static str| Ok((name, value(&given.getattr(name)?)));
+        return Ok(read(C::names().map(named).collect::<PyResult<Vec<_>>>()?));
+    };
     let mut entries = Vec::new();
-    if let Ok(mapping) = given.cast::<PyMapping>() {
-        for item in mapping.items()? {
-            let (name, given): (String, Bound<'_, PyAny>) = item.extract()?;
-            entries.push((name, value(&given)));
-        }
-    } else {
-        for row in C::rows() {
-            entries.push((row.name.to_owned(), value(&given.getattr(row.name)?)));
-        }
+    for item in mapping.items()? {
+        let (name, given): (String, Bound<'_, PyAny>) = item.extract()?;
+        entries.push((name, value(&given)));
     }
     Ok(read(entries))
 }
@@ -157,13 +155,35 @@ pub(crate) fn checked_settings<'py>(
 
 fn checked<'py, C: Configuration>(given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
     let py = given.py();
-    let config = read_config::<C>(given)?;
     let dict = PyDict::new(py);
-    let mapping = given.cast::<PyMapping>().ok();
-    for row in C::rows() {
-        if mapping.is_none_or(|mapping| mapping.contains(row.name).unwrap_or(false)) {
-            dict.set_item(row.name, object(py, &config.get(row.name).unwrap_or(Value::Nothing))?)?;
+    if let Ok(mapping) = given.cast::<PyMapping>() {
+        let config = read_config::<C>(given)?;
+        for name in C::names() {
+            if mapping.contains(name)? {
+                dict.set_item(name, object(py, &config.get(name).unwrap_or(Value::Nothing))?)?;
+            }
+        }
+        return Ok(dict);
+    }
+    let mut config = C::default();
+    for name in C::names() {
+        let found = given.getattr(name)?;
+        config.set(name, &value(&found)).unwrap_or(Ok(())).map_err(|error| to_py(py, &error))?;
+        let kept = config.get(name).unwrap_or(Value::Nothing);
+        if !is_plain(&found, &kept) {
+            dict.set_item(name, object(py, &kept)?)?;
         }
     }
     Ok(dict)
+}
+
+/// Whether an object is of the plain type of its value already.
+fn is_plain(object: &Bound<'_, PyAny>, value: &Value) -> bool {
+    match value {
+        Value::Nothing | Value::Flag(_) => true,
+        Value::Whole(_) => object.is_exact_instance_of::<PyInt>(),
+        Value::Number(_) => object.is_exact_instance_of::<PyFloat>(),
+        Value::Text(_) => object.is_exact_instance_of::<PyString>(),
+        Value::Pair(..) | Value::Other(_) => false,
+    }
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from dataclasses import fields
+from functools import cache
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -34,15 +35,29 @@ _Kind = TypeVar("_Kind", bound="DataclassInstance")
 
 def merged(kind: type[_Kind], settings: DataclassInstance | None, changes: Mapping[str, Any]) -> _Kind:
     """Settings with changes, which go before them; raises SettingError for a name that there is not."""
-    if not changes and isinstance(settings, kind):
-        return settings
+    if not changes:
+        if isinstance(settings, kind):
+            return settings
+        if settings is None:
+            usual: _Kind = _usual(kind)
+            return usual
     given = {} if settings is None else {one.name: getattr(settings, one.name) for one in fields(settings)}
     given |= changes
-    known = [one.name for one in fields(kind)]
-    if unknown := [name for name in given if name not in known]:
+    try:
+        return kind(**given)
+    except TypeError:
+        known = [one.name for one in fields(kind)]
+        unknown = [name for name in given if name not in known]
+        if not unknown:
+            raise
         near = suggestion(unknown[0], known) or f"; there are: {', '.join(known)}"
-        raise UnknownSettingError(f"unknown setting {', '.join(unknown)}{near}")
-    return kind(**given)
+        raise UnknownSettingError(f"unknown setting {', '.join(unknown)}{near}") from None
+
+
+@cache
+def _usual(kind: type[_Kind]) -> _Kind:
+    """The defaults, which are immutable."""
+    return kind()
 
 
 def of_each(settings: Settings) -> Settings:
