@@ -198,9 +198,12 @@ def clocks_told(channels: Sequence[Channel]) -> list[Said]:
     own = list(dict.fromkeys(c.time.source for c in channels if c.time is not None and not c.is_time))
     if not own:
         return []
-    starts = [c.time.start_s for c in channels if c.time is not None and not c.is_time and not c.time.problem]
+    known = [c.time for c in channels if c.time is not None and not c.is_time and not c.time.problem]
+    starts = [time.start_s for time in known]
+    if all(_same(known[0], time) for time in known[1:]):
+        return []
     words = f"channels have times of their own, beginning up to {1e3 * (max(starts) - min(starts)):.6g} ms apart"
-    return [Said(words, "own_times", [max(starts) - min(starts)])] if starts else []
+    return [Said(words, "own_times", [max(starts) - min(starts)])]
 
 
 def _agrees(column: TimeColumn, rate: Rate) -> bool:
