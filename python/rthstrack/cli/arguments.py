@@ -160,22 +160,6 @@ def lines(text: str) -> tuple[int, int]:
     return int(first), int(last)
 
 
-def power_of_two(text: str) -> int:
-    if (value := count(text)) & (value - 1):
-        raise argparse.ArgumentTypeError(f"expected a power of two (1, 2, 4, ...), found '{text}'")
-    return value
-
-
-def factor(text: str) -> int | None:
-    """P or Q; None stands for auto."""
-    if text == "auto":
-        return None
-    try:
-        return power_of_two(text)
-    except argparse.ArgumentTypeError:
-        raise argparse.ArgumentTypeError(f"expected a power of two (1, 2, 4, ...) or auto, found '{text}'") from None
-
-
 def tolerance(text: str) -> float:
     if not 0 < (value := number(text)) < 1:
         raise argparse.ArgumentTypeError(f"expected a number between 0 and 1, found '{text}'")

@@ -7,7 +7,8 @@ import re
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from rthstrack._core import settings_table
+from rthstrack._core import checked_settings, settings_table
+from rthstrack.errors import SettingError
 from rthstrack.evaluation.inputs import merged
 from rthstrack.evaluation.presets import PRESETS
 from rthstrack.evaluation.settings import Settings
@@ -49,7 +50,7 @@ def setting_options(
         name = row["name"]
         flag = (flags or {}).get(name) or option_name(name)
         metavar: str | tuple[str, str] = _metavar(row)
-        yield SettingOption(name, flag, _reader(row), metavar, _help(row, (defaults or {}).get(name)))
+        yield SettingOption(name, flag, _reader(of, row), metavar, _help(row, (defaults or {}).get(name)))
 
 
 def option_name(setting: str) -> str:
@@ -96,32 +97,30 @@ def _metavar(row: _SettingRow) -> str | tuple[str, str]:
     return _METAVARS.get(row["kind"]) or row["unit"].upper() or "X"
 
 
-def _reader(row: _SettingRow) -> Callable[[str], Any]:
-    """From a word of the command line; what does not fit says what is expected."""
+def _reader(of: str, row: _SettingRow) -> Callable[[str], Any]:
+    """From a word of the command line, checked by the core; what does not fit says what is expected."""
 
     def read(text: str) -> Any:
-        found = _value(row, text)
-        if found is None:
-            raise argparse.ArgumentTypeError(f"expected {row['expected']}, found '{text}'")
-        return found
+        value = _value(row["kind"], text)
+        try:
+            checked_settings(of, {row["name"]: (value, value) if row["kind"] == "band" else value})
+        except SettingError:
+            raise argparse.ArgumentTypeError(f"expected {row['expected']}, found '{text}'") from None
+        return value
 
     return read
 
 
-def _value(row: _SettingRow, text: str) -> Any:
-    kind = row["kind"]
+def _value(kind: str, text: str) -> str | int | float:
+    """What a word is for a setting of this kind; a word that is no number stays one."""
     if kind == "choice":
-        return text if text in row["choices"] else None
+        return text
     if kind in ("whole", "power_of_two"):
-        number = int(text) if text.isascii() and text.isdigit() else 0
-        fits = number & (number - 1) == 0 if kind == "power_of_two" else row["least"] <= number <= row["most"]
-        return number if number and fits else None
+        return int(text) if text.isascii() and text.isdigit() else text
     try:
-        value = float(text)
+        return float(text)
     except ValueError:
-        return None
-    lowest = {"positive": value > 0, "not_negative": value >= 0, "band": value >= 0, "share": 0 <= value < 1}
-    return value if abs(value) < float("inf") and lowest.get(kind, True) else None
+        return text
 
 
 def _help(row: _SettingRow, default: str | None) -> str:
