@@ -66,8 +66,7 @@ def read_chosen(
     contents, units, scale = of_time(contents, time, units or {}, scale or {}, file)
     recording = recording_from(contents, file, rate_hz=rate_hz, time=time, resample_hz=resample_hz)
     if recording.rate_hz is None and all(c.time is None or c.time.rate_hz is None for c in recording.channels):
-        why = f"no sampling rate: {recording.rate_source}"
-        raise RecordingError(why, file=file, advice="give {rate_hz} or {time}")
+        raise _no_rate(recording.rate_source, file)
     pairs, proposal = list(zip(targets, measured, strict=False)), None
     if len(targets) != len(measured):
         raise SettingError(f"one measured for each target is needed, found {len(measured)} for {len(targets)}")
@@ -75,8 +74,7 @@ def read_chosen(
         pairs, proposal = propose_pair(recording)
     judged = [one for pair in pairs for one in pair]
     for one in (*judged, *commands):
-        if recording.channel(one).is_time:
-            raise ChannelError(f"'{recording.channel(one).path}' holds the time, and no motion", file=file, code="time")
+        _refuse_time(recording.channel(one), file)
     if fill:
         recording = recording.filled(fill)
     recording = on_one_clock(recording, (*judged, *commands))
@@ -88,10 +86,18 @@ def read_chosen(
     if start_s is not None or end_s is not None:
         recording = recording.cut(start_s, end_s)
     if recording.rate_hz is None:
-        why = f"no sampling rate: {recording.rate_source}"
-        raise RecordingError(why, file=file, advice="give {rate_hz} or {time}")
+        raise _no_rate(recording.rate_source, file)
     _refuse_blank_ends(recording, judged)
     return ChosenPairs(recording, recording.rate_hz, pairs, proposal)
+
+
+def _no_rate(why: str, file: str) -> RecordingError:
+    return RecordingError(f"no sampling rate: {why}", file=file, advice="give {rate_hz} or {time}")
+
+
+def _refuse_time(channel: Channel, file: str) -> None:
+    if channel.is_time:
+        raise ChannelError(f"'{channel.path}' holds the time, and no motion", file=file, code="time")
 
 
 def read_two(
@@ -123,12 +129,11 @@ def read_two(
         contents, units, scale = of_time(contents, time, units, scale, file, lenient=True)
         recording = recording_from(contents, file, rate_hz=rate_hz, time=time, resample_hz=resample_hz)
         channel = recording.channel(selector)
-        if channel.is_time:
-            raise ChannelError(f"'{channel.path}' holds the time, and no motion", file=file, code="time")
+        _refuse_time(channel, file)
         own = channel.time or OwnTime(recording.rate_source, recording.rate_hz, recording.start_s)
         if own.rate_hz is None:
             why = own.problem or recording.rate_source
-            raise RecordingError(f"no sampling rate: {why}", file=file, advice="give {rate_hz} or {time}")
+            raise _no_rate(why, file)
         counts, first_ns = _counts_from(contents, recording, given=rate_hz is not None)
         from_ns = first_ns if not sides else from_ns
         start = (first_ns - from_ns) / 1e9
