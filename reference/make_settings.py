@@ -96,7 +96,9 @@ def settings_module() -> str:
     own = [row for row in moving if row["name"] not in {other["name"] for other in evaluation}]
     factors = [row for row in evaluation if row["name"].endswith("_decimation")]
     others = [row for row in evaluation if row not in factors]
-    study = [row for row in evaluation if row["in_study"]]
+    # The subject of a study is the published average.
+    of_study = {"estimator": "fei"}
+    study = [{**row, "default": of_study.get(row["name"], row["default"])} for row in evaluation if row["in_study"]]
     by_keyword = [row for row in monitor if row["name"] not in ("rate_hz", "window_s", "update_hz")]
     of_monitor = "A monitor's settings by name; P may be None, to be chosen for the band."
     parts = [

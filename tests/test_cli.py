@@ -20,6 +20,9 @@ KEYS = {
     "equivalent_frequency_hz", "n_bins", "delta_f_hz", "settings", "indices", "warnings", "amplitude_std",
     "amplitude_interval", "delay_std_s", "delay_interval_s", "residual_coherence", "goodness", "reason", "trusted",
     "slopes", "depends_on", "dependence", "argument", "reason_code", "reason_values", "warning_codes",
+    "actuator_number", "actuator_name", "verdict", "estimator", "published", "limits", "outcome", "exceeded",
+    "not_judged", "gates", "conclusion", "loop", "moving", "moving_note", "frequency_response",
+    "frequency_response_note",
 }  # fmt: skip
 TRUSTED = {
     "estimator", "amplitude", "amplitude_interval", "delay_s", "delay_interval_s", "target_noise_std", "bad_samples",
@@ -74,8 +77,8 @@ def test_the_real_machine_gives_the_stated_amplitude_and_delay(
     status, document = run_json(capsys, file, "--target", "CHANNEL2", "--measured", "CHANNEL0")
     assert status == 0
     (result,) = document["results"]
-    assert result["amplitude"] == pytest.approx(0.7169693617709628, rel=1e-9)
-    assert result["delay_s"] == pytest.approx(0.01350753731, rel=1e-6)
+    assert result["published"]["amplitude"] == pytest.approx(0.7169693617709628, rel=1e-9)
+    assert result["published"]["delay_s"] == pytest.approx(0.01350753731, rel=1e-6)
     assert result["n_samples"] == 46800
     assert result["rate_hz"] == 1000
 
@@ -88,7 +91,7 @@ def test_the_json_has_exactly_the_promised_keys(capsys: pytest.CaptureFixture[st
     (result,) = document["results"]
     assert set(result) == KEYS
     assert set(result["indices"]) == INDICES
-    assert set(result["trusted"]) == TRUSTED
+    assert set(result["trusted"]) == set(result["published"]) == TRUSTED
     assert (result["target"], result["measured"], result["unit"]) == ("target_1 (mm)", "measured_1 (mm)", "mm")
     assert result["actuator"] == 0
     assert result["amplitude"] == pytest.approx(1.05, rel=1e-4)
@@ -141,7 +144,20 @@ def test_pairs_may_be_repeated_one_for_each_actuator(capsys: pytest.CaptureFixtu
 
 
 def test_settings_reach_the_evaluation_and_the_json(capsys: pytest.CaptureFixture[str], recorded: Path) -> None:
-    options = ["-P", 4, "-Q", 2, "--decimator", "chebyshev", "--weight-power", 3, "--window", "tukey"]
+    options = [
+        "--estimator",
+        "fei",
+        "-P",
+        4,
+        "-Q",
+        2,
+        "--decimator",
+        "chebyshev",
+        "--weight-power",
+        3,
+        "--window",
+        "tukey",
+    ]
     status, document = run_json(capsys, recorded, *options, "--detrend", "mean", "--band", 0.5, 8)
     assert status == 0
     settings = document["results"][0]["settings"]
@@ -166,7 +182,8 @@ def test_limits_decide_the_exit_status(capsys: pytest.CaptureFixture[str], recor
     assert run(capsys, recorded, "--limit-delay", 0.021, "--limit-amplitude", 0.06)[0] == 0
     status, out, _ = run(capsys, recorded, "--limit-delay", 0.019)
     assert status == 3
-    assert "limit exceeded: |delay| 20 ms exceeds the limit of 19 ms" in out
+    assert out.rstrip().splitlines()[-1].startswith("FAIL: |delay| 20.00")
+    assert "exceeds the limit of 19 ms" in out
     assert run(capsys, recorded, "--limit-amplitude", 0.04)[0] == 3
     assert run(capsys, recorded, "--limit-delay", 0.019, "--json")[0] == 3
 
@@ -200,7 +217,9 @@ def test_outputs_are_written_where_asked(capsys: pytest.CaptureFixture[str], rec
     readings = list(csv.DictReader((out / "r_moving.csv").read_text(encoding="utf-8").splitlines()))
     assert len(readings) == 19
     assert {r["valid"] for r in readings} == {"True", "False"}
-    assert err.count("written to") == 4
+    curves = list(csv.DictReader((out / "r_frequency.csv").read_text(encoding="utf-8").splitlines()))
+    assert {"frequency_hz", "gain", "delay_s", "delay_low_s", "delay_high_s", "coherence"} <= set(curves[0])
+    assert err.count("written to") == 5
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rthstrack import assess, choose_factors, evaluate, evaluate_moving, key_frequencies
+from rthstrack import Settings, assess, choose_factors, evaluate, evaluate_moving, key_frequencies
 from rthstrack.cli import main
 from rthstrack.errors import SettingError, SignalError
 from rthstrack.evaluation.factors import prior_bounds
@@ -23,6 +23,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "benchmarks"))
 import accuracy_factors
 
 RATE = 200.0
+PUBLISHED = Settings("fei")
+FEI = ("--estimator", "fei")
 NEAR_ZERO_RAD = 0.001
 
 
@@ -89,6 +91,7 @@ def test_the_bound_holds_for_the_evaluation_and_the_settings_are_ready_for_it() 
     settings: dict[str, Any] = {"window": "hann", "detrend": "linear", "weight_power": 3, "band_hz": (0.2, 40.0)}
     found = choose_factors(target, measured, RATE, **settings)
     assert found.settings.window == "hann"
+    settings = {"estimator": "fei"} | settings
     reference = evaluate(target, measured, RATE, **settings)
     chosen = evaluate(
         target,
@@ -181,10 +184,10 @@ def test_the_window_that_would_allow_a_larger_q_is_said_and_nothing_is_changed(
     path = tmp_path / "cut.csv"
     np.savetxt(path, np.column_stack([np.arange(target.size) / RATE, target, measured]), delimiter=",",
                header="time (s),target (mm),measured (mm)", comments="", fmt="%.17g")  # fmt: skip
-    status, out, _ = run(capsys, path, "-P", "auto", "-Q", "auto")
+    status, out, _ = run(capsys, path, "--estimator", "fei", "-P", "auto", "-Q", "auto")
     assert status == 0
     assert windowed.sentence in " ".join(out.split())
-    (entry,) = json.loads(run(capsys, path, "-P", "auto", "-Q", "auto", "--json")[1])["results"]
+    (entry,) = json.loads(run(capsys, path, "--estimator", "fei", "-P", "auto", "-Q", "auto", "--json")[1])["results"]
     assert entry["settings"]["chosen_factors"]["windowed"]["frequency_decimation"] == windowed.frequency_decimation
     assert entry["settings"]["window"] == "boxcar"
 
@@ -195,7 +198,7 @@ def test_a_given_factor_stays() -> None:
     assert found.frequency_decimation == 4
     assert found.reference.settings.frequency_decimation == 4
     assert set(found.changes.frequency_decimation.tolist()) == {4}
-    at_one = evaluate(target, measured, RATE, frequency_decimation=4)
+    at_one = evaluate(target, measured, RATE, PUBLISHED, frequency_decimation=4)
     assert found.reference.delta_f_hz == at_one.delta_f_hz
     assert "from P = 1, Q = 4" in found.sentence
 
@@ -326,7 +329,7 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: object, command: str = "
 def test_the_command_prints_the_choice_and_its_bound(
     capsys: pytest.CaptureFixture[str], recorded: Path, tmp_path: Path
 ) -> None:
-    status, out, _ = run(capsys, recorded, "-P", "auto", "-Q", "auto", "--tolerance", "0.02", "--json",
+    status, out, _ = run(capsys, recorded, *FEI, "-P", "auto", "-Q", "auto", "--tolerance", "0.02", "--json",
                          "--report", tmp_path / "report.html")  # fmt: skip
     assert status == 0
     (entry,) = json.loads(out)["results"]
@@ -346,14 +349,14 @@ def test_the_command_prints_the_choice_and_its_bound(
     }
     report = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert 'data-setting="chosen_factors · amplitude_bound"' in report
-    status, out, _ = run(capsys, recorded, "-P", "auto", "-Q", "auto", "--tolerance", "0.02")
+    status, out, _ = run(capsys, recorded, *FEI, "-P", "auto", "-Q", "auto", "--tolerance", "0.02")
     assert found.sentence in " ".join(out.split())
     assert "windows of 4 s at P = 1, Q = 1: delay" in " ".join(out.split())
     assert "at P = 1, Q = 1" not in run(capsys, recorded)[1]
 
 
 def test_one_factor_may_be_given(capsys: pytest.CaptureFixture[str], recorded: Path) -> None:
-    status, out, _ = run(capsys, recorded, "-P", "4", "-Q", "auto", "--json")
+    status, out, _ = run(capsys, recorded, *FEI, "-P", "4", "-Q", "auto", "--json")
     assert status == 0
     settings = json.loads(out)["results"][0]["settings"]
     assert settings["data_decimation"] == settings["chosen_factors"]["reference_data_decimation"] == 4
@@ -362,12 +365,14 @@ def test_one_factor_may_be_given(capsys: pytest.CaptureFixture[str], recorded: P
 
 def test_moving_windows_keep_the_factors_that_were_given() -> None:
     target, measured = response(0.012)
-    found = assess(target, measured, RATE, choose=("Q",))
+    found = assess(target, measured, RATE, settings=PUBLISHED, choose=("Q",))
     assert found.tracking.settings.frequency_decimation > 1
     assert found.moving is not None
     assert found.moving.settings.frequency_decimation == 1
-    alone = evaluate_moving(target, measured, RATE, window_s=found.moving.window_s, hop_s=found.moving.hop_s)
+    alone = evaluate_moving(target, measured, RATE, PUBLISHED, window_s=found.moving.window_s, hop_s=found.moving.hop_s)
     assert np.array_equal(found.moving.delay_s, alone.delay_s, equal_nan=True)
+    with pytest.raises(SettingError, match="estimator = least_squares goes only with P and Q that are given"):
+        assess(target, measured, RATE, choose=("Q",))
     with pytest.raises(SettingError, match="choose takes P and Q, not 'R'"):
         assess(target, measured, RATE, choose=("R",))
 
@@ -381,7 +386,11 @@ def test_moving_windows_keep_the_factors_that_were_given() -> None:
         (["-P", "auto", "--tolerance", "1"], "expected a number between 0 and 1, found '1'"),
         (["-P", "auto", "--tolerance", "x"], "expected a number, found 'x'"),
         (["--tolerance", "0.01"], "--tolerance speaks of P and Q that are chosen"),
-        (["-Q", "auto", "--decimator", "chebyshev"], "-P auto and -Q auto need --decimator spectral, found chebyshev"),
+        (["-P", "auto"], "-P auto and -Q auto need --estimator fei, found least_squares"),
+        (
+            ["-Q", "auto", *FEI, "--decimator", "chebyshev"],
+            "-P auto and -Q auto need --decimator spectral, found chebyshev",
+        ),
     ],
 )
 def test_bad_values_are_misuse(
@@ -406,7 +415,7 @@ def test_a_study_holds_the_chosen_factors_and_key_frequencies_beside_its_grid() 
     assert [c.kind for c in found.select(source="late")] == ["grid"] * 8
     assert found.cell(source="late", window="hann", P=2).kind == "grid"
     target, measured = response(-0.02)
-    reference = evaluate(target, measured, RATE, window="hann")
+    reference = evaluate(target, measured, RATE, PUBLISHED, window="hann")
     (chosen,) = found.select(source="early", window="hann", kind="chosen")
     factors = choose_factors(target, measured, RATE, tolerance=0.02, window="hann")
     assert chosen.settings == factors.settings

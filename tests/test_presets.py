@@ -15,7 +15,7 @@ from rthstrack.cli import main
 
 NAMES = ("estimator", "data_decimation", "frequency_decimation", "window", "detrend")
 PAPER = ("fei", 1, 16, "tukey", "mean")
-USUAL = ("fei", 1, 1, "boxcar", "none")
+USUAL = ("least_squares", 1, 1, "boxcar", "mean")
 
 
 @pytest.fixture
@@ -43,12 +43,14 @@ def test_a_preset_is_settings() -> None:
         "paper": PAPER,
         "paper-fast": ("fei", 16, 16, "tukey", "mean"),
     }
-    assert preset("paper") == Settings(frequency_decimation=16, window="tukey", detrend="mean")
+    assert preset("paper") == Settings("fei", frequency_decimation=16, window="tukey", detrend="mean")
     assert preset("paper-fast", window="hann").window == "hann"
     rng = np.random.default_rng(0)
     x = np.cumsum(rng.standard_normal(4096))
     found = rthstrack.Evaluator(4096, 256.0, preset("paper")).evaluate(x, np.roll(x, 3))
-    same = rthstrack.evaluate(x, np.roll(x, 3), 256.0, frequency_decimation=16, window="tukey", detrend="mean")
+    same = rthstrack.evaluate(
+        x, np.roll(x, 3), 256.0, Settings("fei", frequency_decimation=16, window="tukey", detrend="mean")
+    )
     assert (found.delay_s, found.amplitude) == (same.delay_s, same.amplitude)
 
 

@@ -97,7 +97,7 @@ def test_settings_whole_or_by_keyword_are_the_same_and_keywords_go_before() -> N
     assert evaluate(TARGET, MEASURED, 256, settings, detrend="linear").settings.detrend == "linear"
     moving = evaluate_moving(TARGET, MEASURED, 256, settings, window_s=2.0)
     assert (moving.settings, moving.window_s, moving.hop_s) == (settings, 2.0, 0.25)
-    whole = MonitorSettings(256.0, update_hz=8.0, estimator="least_squares")
+    whole = MonitorSettings(256.0, update_hz=8.0, estimator="least_squares", detrend="mean")
     assert Monitor(whole).settings == whole
     assert Monitor(whole, detrend="linear").settings == dataclasses.replace(whole, detrend="linear")
 

@@ -323,9 +323,10 @@ def test_a_large_q_takes_less_time(reference: dict[str, Pair]) -> None:
 def test_a_study_is_frozen_and_carries_its_settings() -> None:
     found = study(late(), P=(4, 1), Q=[1], windows=["hann", "boxcar"], band_hz=(1, 20), timing=False)
     assert found.settings == StudySettings(
-        P=(1, 4), Q=(1,), windows=("hann", "boxcar"), weight_powers=(2,), band_hz=(1.0, 20.0), timing=False
-    )
-    assert found.cells[0].settings == Settings(window="hann", band_hz=(1.0, 20.0))
+        P=(1, 4), Q=(1,), windows=("hann", "boxcar"), weight_powers=(2,), detrend="none", band_hz=(1.0, 20.0),
+        timing=False,
+    )  # fmt: skip
+    assert found.cells[0].settings == Settings("fei", window="hann", detrend="none", band_hz=(1.0, 20.0))
     with pytest.raises(dataclasses.FrozenInstanceError):
         found.cells = ()  # type: ignore[misc]
     with pytest.raises(dataclasses.FrozenInstanceError):

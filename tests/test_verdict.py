@@ -26,8 +26,9 @@ def narrow_noise() -> np.ndarray:
 
 
 def warned(target: np.ndarray, measured: np.ndarray, **options: Any) -> str:
-    """All that is said beside the numbers: the argument, and the warnings that it does not say itself."""
-    assessment = rthstrack.assess(target, measured, RATE, **options)
+    """All that is said beside the published average: the argument, and the warnings that it does not say itself."""
+    settings = options.pop("settings", rthstrack.Settings(estimator="fei"))
+    assessment = rthstrack.assess(target, measured, RATE, settings=settings, **options)
     return "\n".join((assessment.argument, *assessment.warnings))
 
 
@@ -74,7 +75,7 @@ def test_a_delay_that_varies_with_frequency_is_not_one_number() -> None:
 
 
 def test_detrending_takes_the_warning_of_an_offset_away() -> None:
-    settings = rthstrack.Settings(detrend="mean")
+    settings = rthstrack.Settings(estimator="fei", detrend="mean")
     assert "offset" not in warned(response() + 8, response(0.01) + 8, settings=settings)
 
 
@@ -125,7 +126,7 @@ def test_noise_on_the_target_is_told_with_its_level_and_taken_for_the_cause() ->
     (told,) = assessment.warnings
     assert "target holds noise of its own, 3 % of its standard deviation" in told
     assert assessment.trusted.target_noise_std == pytest.approx(0.03 * response().std(), rel=0.05)
-    assert "use the trusted estimate" in assessment.argument
+    assert "this is the trusted estimate" in assessment.argument
     assert "noise" in assessment.argument
     assert "mean" not in assessment.argument
 

@@ -34,6 +34,7 @@ __all__ = [
     "settings_table",
     "shear_building",
     "unit",
+    "usual_detrend",
 ]
 
 _Array = NDArray[np.float64]
@@ -96,6 +97,7 @@ class _SettingRow(TypedDict):
     default: Any
 
 def settings_table(of: str) -> list[_SettingRow]: ...
+def usual_detrend(estimator: str) -> str: ...
 def checked_settings(of: str, given: object) -> dict[str, Any]: ...
 
 @final

@@ -30,7 +30,7 @@
 #include <stdint.h>
 
 // The interface that this header describes; see rthstrack_abi_version.
-#define RTHSTRACK_ABI_VERSION 1
+#define RTHSTRACK_ABI_VERSION 2
 
 // What a call answers.
 enum rthstrack_status
@@ -155,6 +155,8 @@ enum rthstrack_detrend
   : int32_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
+    // The mean; with RTHSTRACK_ESTIMATOR_FEI nothing.
+    RTHSTRACK_DETREND_USUAL = -1,
     // Nothing.
     RTHSTRACK_DETREND_NONE = 0,
     // The mean.
@@ -229,9 +231,9 @@ typedef struct rthstrack_monitor_config {
     double minimum_amplitude;
     // A rthstrack_window. Default RTHSTRACK_WINDOW_BOXCAR.
     int32_t window;
-    // A rthstrack_detrend. Default RTHSTRACK_DETREND_MEAN.
+    // A rthstrack_detrend. Default RTHSTRACK_DETREND_USUAL.
     int32_t detrend;
-    // A rthstrack_estimator. Default RTHSTRACK_ESTIMATOR_FEI.
+    // A rthstrack_estimator. Default RTHSTRACK_ESTIMATOR_LEAST_SQUARES.
     int32_t estimator;
     // Actuators that are stepped together. Default 1.
     uint32_t n_actuators;

@@ -6,7 +6,7 @@ use crate::boundary::{guarded, is_sound_out};
 use crate::status::rthstrack_status::{self, *};
 
 /// The interface that this header describes; see rthstrack_abi_version.
-pub const RTHSTRACK_ABI_VERSION: u32 = 1;
+pub const RTHSTRACK_ABI_VERSION: u32 = 2;
 
 /// Window over the samples.
 #[repr(i32)]
@@ -30,6 +30,8 @@ pub enum rthstrack_window {
 #[repr(i32)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum rthstrack_detrend {
+    /// The mean; with RTHSTRACK_ESTIMATOR_FEI nothing.
+    RTHSTRACK_DETREND_USUAL = -1,
     /// Nothing.
     RTHSTRACK_DETREND_NONE = 0,
     /// The mean.
@@ -37,6 +39,8 @@ pub enum rthstrack_detrend {
     /// The straight line of least squares.
     RTHSTRACK_DETREND_LINEAR = 2,
 }
+
+const DETREND_USUAL: i32 = rthstrack_detrend::RTHSTRACK_DETREND_USUAL as i32;
 
 /// How gain and delay are estimated.
 #[repr(i32)]
@@ -79,9 +83,9 @@ pub struct rthstrack_monitor_config {
     pub minimum_amplitude: f64,
     /// A rthstrack_window. Default RTHSTRACK_WINDOW_BOXCAR.
     pub window: i32,
-    /// A rthstrack_detrend. Default RTHSTRACK_DETREND_MEAN.
+    /// A rthstrack_detrend. Default RTHSTRACK_DETREND_USUAL.
     pub detrend: i32,
-    /// A rthstrack_estimator. Default RTHSTRACK_ESTIMATOR_FEI.
+    /// A rthstrack_estimator. Default RTHSTRACK_ESTIMATOR_LEAST_SQUARES.
     pub estimator: i32,
     /// Actuators that are stepped together. Default 1.
     pub n_actuators: u32,
@@ -110,7 +114,7 @@ impl rthstrack_monitor_config {
             expected_delay_s: evaluator.expected_delay_s.unwrap_or(f64::NAN),
             minimum_amplitude: config.minimum_amplitude,
             window: code(&Window::NAMES, evaluator.window),
-            detrend: code(&Detrend::NAMES, evaluator.detrend),
+            detrend: evaluator.detrend.map_or(DETREND_USUAL, |detrend| code(&Detrend::NAMES, detrend)),
             estimator: code(&Estimator::NAMES, evaluator.estimator),
             n_actuators: config.n_actuators as u32,
             data_decimation: evaluator.data_decimation as u32,
@@ -144,7 +148,10 @@ impl rthstrack_monitor_config {
             evaluator: EvaluatorConfig {
                 band_hz: whole.then_some(band_hz),
                 window: choice("window", &Window::NAMES, self.window, "a RTHSTRACK_WINDOW_...")?,
-                detrend: choice("detrend", &Detrend::NAMES, self.detrend, "a RTHSTRACK_DETREND_...")?,
+                detrend: match self.detrend {
+                    DETREND_USUAL => None,
+                    asked => Some(choice("detrend", &Detrend::NAMES, asked, "a RTHSTRACK_DETREND_...")?),
+                },
                 estimator: choice("estimator", &Estimator::NAMES, self.estimator, "a RTHSTRACK_ESTIMATOR_...")?,
                 data_decimation: self.data_decimation as usize,
                 frequency_decimation: self.frequency_decimation as usize,

@@ -91,7 +91,7 @@ fn main() {
         let pair = Pair::new(&target, &measured, RATE_HZ).expect("a valid pair");
         let before = IN_USE.load(Ordering::Relaxed);
         PEAK.store(before, Ordering::Relaxed);
-        let evaluator = Evaluator::new(n, RATE_HZ, EvaluatorConfig::default()).expect("a valid plan");
+        let evaluator = Evaluator::new(n, RATE_HZ, EvaluatorConfig::published()).expect("a valid plan");
         let mut state = evaluator.state();
         black_box(evaluator.evaluate(&mut state, &pair).expect("a valid pair"));
         let peak = (PEAK.load(Ordering::Relaxed) - before) as f64 / (16 * n) as f64;
@@ -133,7 +133,8 @@ fn main() {
         ];
         for p in P {
             for q in Q {
-                let config = EvaluatorConfig { data_decimation: p, frequency_decimation: q, ..Default::default() };
+                let config =
+                    EvaluatorConfig { data_decimation: p, frequency_decimation: q, ..EvaluatorConfig::published() };
                 let evaluator = Evaluator::new(n, RATE_HZ, config).expect("a valid plan");
                 let mut state = evaluator.state();
                 let pair = &pair;
@@ -160,7 +161,7 @@ fn main() {
         let config = MovingConfig {
             window_s: 4.0,
             hop_s: 1.0 / 64.0,
-            evaluator: EvaluatorConfig { data_decimation: 16, window, ..Default::default() },
+            evaluator: EvaluatorConfig { data_decimation: 16, window, ..EvaluatorConfig::published() },
             ..Default::default()
         };
         let pair = &pair;

@@ -112,7 +112,7 @@ impl Evaluator {
             data_decimation,
             frequency_decimation: config.frequency_decimation,
             window: config.window,
-            detrend: config.detrend,
+            detrend: config.detrending(),
             band_hz: config.band_hz,
         })
         .map_err(|error| match error {
@@ -442,7 +442,7 @@ impl Moving<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::window::Window;
+    use crate::window::{Detrend, Window};
 
     #[test]
     fn the_published_evaluation_is_planned_and_kept_only_where_it_is_asked_for() {
@@ -450,7 +450,8 @@ mod tests {
         let measured: Vec<f64> = target.iter().map(|v| 0.9 * v).collect();
         let pair = Pair::new(&target, &measured, 1000.0).unwrap();
         let plan = |estimator| {
-            let config = EvaluatorConfig { estimator, window: Window::Hann, ..Default::default() };
+            let detrend = Some(Detrend::None);
+            let config = EvaluatorConfig { estimator, window: Window::Hann, detrend, ..Default::default() };
             let evaluator = Evaluator::new(target.len(), 1000.0, config).unwrap();
             let state = evaluator.state();
             (evaluator, state)

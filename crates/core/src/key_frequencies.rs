@@ -48,7 +48,7 @@ pub struct KeyFrequenciesConfig {
 
 impl Default for KeyFrequenciesConfig {
     fn default() -> Self {
-        Self { share: 0.999, evaluator: EvaluatorConfig::default() }
+        Self { share: 0.999, evaluator: EvaluatorConfig::published() }
     }
 }
 

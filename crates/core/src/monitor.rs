@@ -19,7 +19,6 @@ use crate::setting::{Configuration, Kind};
 use crate::settings::{Estimator, EvaluatorConfig, check_expected_delay};
 use crate::sums;
 use crate::tracking::Tracking;
-use crate::window::Detrend;
 
 /// Samples after decimation that the windows of all actuators may hold.
 const MAX_SAMPLES: f64 = 4_194_304.0;
@@ -45,7 +44,7 @@ crate::configuration! {
         /// How each window is evaluated. P is carried out as samples come ([`CausalDecimator`]), and the window evaluated at rate / P.
         /// With P above 1 the band's upper end is rate / (4 P) at most, and that where none is given; least squares leaves an upper
         /// end of just this, with a lower end of 0, to the decimator's slope.
-        evaluator: EvaluatorConfig = EvaluatorConfig { detrend: Detrend::Mean, ..EvaluatorConfig::default() };
+        evaluator: EvaluatorConfig = EvaluatorConfig::default();
     }
 }
 
@@ -78,9 +77,8 @@ impl Reading {
 /// The checked plan: one for any number of streams of this rate.
 ///
 /// ```
-/// use rthstrack::{Estimator, EvaluatorConfig, Monitor, MonitorConfig};
-/// let estimator = Estimator::LeastSquares;
-/// let evaluator = EvaluatorConfig { estimator, data_decimation: 8, ..MonitorConfig::default().evaluator };
+/// use rthstrack::{EvaluatorConfig, Monitor, MonitorConfig};
+/// let evaluator = EvaluatorConfig { data_decimation: 8, ..EvaluatorConfig::default() };
 /// let monitor = Monitor::new(MonitorConfig { update_hz: 16.0, evaluator, ..Default::default() })?;
 /// let mut state = monitor.state();
 /// // Measured comes 20 ms later and 5 % too small.

@@ -33,7 +33,7 @@ use crate::evaluator::Evaluator;
 use crate::pair::Pair;
 use crate::quantile::student_t_975;
 use crate::reason::Reason;
-use crate::settings::{Estimator, EvaluatorConfig};
+use crate::settings::EvaluatorConfig;
 use crate::spectrum::{Bins, Sink, Spectrum, SpectrumConfig, SpectrumState};
 use crate::tracking::delay;
 use crate::window::{Detrend, Window};
@@ -216,8 +216,7 @@ fn aligned(pair: &Pair<'_>, config: &ResponseConfig) -> Result<(Welch, f64, Opti
     }
     // Whatever else is wrong is said first.
     let plain = Welch::new(pair, config)?;
-    let settings = EvaluatorConfig { estimator: Estimator::LeastSquares, detrend: Detrend::Mean, ..Default::default() };
-    let evaluator = Evaluator::new(pair.n_samples(), pair.rate_hz(), settings)?;
+    let evaluator = Evaluator::new(pair.n_samples(), pair.rate_hz(), EvaluatorConfig::default())?;
     let found = evaluator.evaluate(&mut evaluator.state(), pair)?;
     if let Some(reason) = found.reason.filter(Reason::is_undetermined) {
         return Ok((plain, 0.0, Some(Unaligned::Unknown(reason))));

@@ -16,11 +16,11 @@ const ALL: u8 = EVALUATION | MONITOR | STUDY;
 #[non_exhaustive]
 pub enum Estimator {
     /// The published weighted average, Eq 12.
-    #[default]
     Fei,
     /// Eq 12 on the target shifted by the delay, until no phase is left: no bias of windows, of drift or of averaged phases.
     Aligned,
     /// One gain and one delay by least squares on the shifted target: as precise as the noise allows.
+    #[default]
     LeastSquares,
 }
 
@@ -65,7 +65,7 @@ crate::configuration! {
     #[derive(Debug, Clone, Copy, PartialEq)]
     pub struct EvaluatorConfig for 0 => {
         /// How gain and delay are estimated.
-        estimator: Estimator = Estimator::Fei, Kind::Choice(Estimator::CODES), "", "Estimator", ALL;
+        estimator: Estimator = Estimator::LeastSquares, Kind::Choice(Estimator::CODES), "", "Estimator", ALL;
         /// P, a power of two: keeps the frequencies up to rate / (2 P); of a monitor up to rate / (4 P).
         data_decimation: usize = 1, Kind::PowerOfTwo, "", "Data decimation P", EVALUATION | MONITOR;
         /// Q, a power of two: keeps every Q-th frequency bin.
@@ -76,8 +76,8 @@ crate::configuration! {
         weight_power: u32 = 2, Kind::Whole(1, 16), "", "Weight power l", EVALUATION;
         /// Window over the record.
         window: Window = Window::Boxcar, Kind::Choice(Window::CODES), "", "Window", EVALUATION | MONITOR;
-        /// What is subtracted before the window.
-        detrend: Detrend = Detrend::None, Kind::Choice(Detrend::CODES), "", "Detrend", ALL;
+        /// What is subtracted before the window; where nothing is asked for the mean, of fei nothing.
+        detrend: Option<Detrend> = None, Kind::Choice(Detrend::CODES), "", "Detrend", ALL;
         /// Lowest and highest frequency judged, both included.
         band_hz: Option<(f64, f64)> = None, Kind::Band, "Hz", "Band", ALL;
         /// Largest delay or lead looked for by all estimators but fei; where the record does not go on beyond what is judged, a
@@ -96,6 +96,17 @@ crate::configuration! {
 }
 
 impl EvaluatorConfig {
+    /// The published average, all else as by default.
+    pub fn published() -> Self {
+        Self { estimator: Estimator::Fei, ..Self::default() }
+    }
+
+    /// What is subtracted before the window: what was asked for, else the published average takes the samples as they are, and
+    /// the others, which fit one gain to both, do not take two sensors to share a zero.
+    pub fn detrending(&self) -> Detrend {
+        self.detrend.unwrap_or(if self.estimator == Estimator::Fei { Detrend::None } else { Detrend::Mean })
+    }
+
     /// What can be said of the settings without a record.
     pub(crate) fn check(&self) -> Result<()> {
         self.check_each()?;

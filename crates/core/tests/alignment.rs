@@ -52,7 +52,8 @@ fn a_lag_and_a_lead_are_found_with_their_signs_whatever_the_window() {
         for (_, estimator) in &Estimator::NAMES[1..] {
             for (_, window) in Window::NAMES {
                 for (_, detrend) in Detrend::NAMES {
-                    let config = EvaluatorConfig { estimator: *estimator, window, detrend, ..Default::default() };
+                    let config =
+                        EvaluatorConfig { estimator: *estimator, window, detrend: Some(detrend), ..Default::default() };
                     let found = evaluate(&target, &measured, config);
                     let context = format!("{delay_s} {estimator:?} {window:?} {detrend:?}: {found:?}");
                     assert!((found.amplitude - GAIN).abs() < INTERPOLATION, "{context}");
@@ -269,8 +270,8 @@ fn no_interval_is_given_where_the_residual_follows_the_target() {
 fn settings_that_exclude_each_other_are_refused() {
     let refused = |config: EvaluatorConfig| Evaluator::new(8192, RATE_HZ, config).err();
     let combined = |error: Option<Error>| matches!(error, Some(Error::Combination { .. }));
-    assert!(combined(refused(EvaluatorConfig { noise_ratio: 1.0, ..Default::default() })));
-    assert!(combined(refused(EvaluatorConfig { noise: Noise::Coloured, ..Default::default() })));
+    assert!(combined(refused(EvaluatorConfig { noise_ratio: 1.0, ..EvaluatorConfig::published() })));
+    assert!(combined(refused(EvaluatorConfig { noise: Noise::Coloured, ..EvaluatorConfig::published() })));
     assert!(combined(refused(EvaluatorConfig { weight_power: 3, ..least_squares() })));
     assert!(combined(refused(EvaluatorConfig { noise: Noise::Coloured, noise_ratio: 1.0, ..least_squares() })));
     for max_delay_s in [0.0, -1.0, f64::NAN, f64::INFINITY] {
@@ -292,7 +293,7 @@ fn settings_that_exclude_each_other_are_refused() {
         }
         assert!(refused(told(-0.25)).is_none() && refused(told(0.25)).is_none());
     }
-    let published = EvaluatorConfig { expected_delay_s: Some(0.01), ..Default::default() };
+    let published = EvaluatorConfig { expected_delay_s: Some(0.01), ..EvaluatorConfig::published() };
     let error = refused(published).unwrap().to_string();
     assert_eq!(error, "expected_delay_s = 0.01 goes only with estimator aligned or least_squares; change one of them");
     for noise_ratio in [-1.0, f64::NAN, f64::INFINITY] {
@@ -334,7 +335,7 @@ fn odd_samples_are_answered() {
             for len in [4, 5, 16, 63, 64, 300, n] {
                 for kind in kinds {
                     for (window, detrend) in [(Window::Boxcar, Detrend::None), (Window::Hann, Detrend::Mean)] {
-                        let config = EvaluatorConfig { window, detrend, ..kind };
+                        let config = EvaluatorConfig { window, detrend: Some(detrend), ..kind };
                         let Ok(pair) = Pair::new(&target[..len], &measured[..len], RATE_HZ) else { continue };
                         let Ok(evaluator) = Evaluator::new(len, RATE_HZ, config) else { continue };
                         let found = evaluator.evaluate(&mut evaluator.state(), &pair).unwrap();
@@ -489,7 +490,7 @@ fn noise_on_the_target_draws_the_delay_to_no_fraction_of_a_sample() {
                 let found = evaluate(
                     &noisy(0.0, 1.0, &first),
                     &noisy(delay_s, 0.95, &second),
-                    EvaluatorConfig { detrend: Detrend::Mean, ..least_squares() },
+                    EvaluatorConfig { detrend: Some(Detrend::Mean), ..least_squares() },
                 );
                 assert!((found.target_noise_std / share - 1.0).abs() < 0.1, "{found:?}");
                 error += (found.delay_s - delay_s) / DRAWS as f64;
@@ -535,7 +536,7 @@ fn intervals_hold_where_the_noise_follows_the_velocity() {
                 0.95 * motion(t) + 0.001 * velocity * errors[i]
             })
             .collect();
-        let found = evaluate(&target, &measured, EvaluatorConfig { detrend: Detrend::Mean, ..least_squares() });
+        let found = evaluate(&target, &measured, EvaluatorConfig { detrend: Some(Detrend::Mean), ..least_squares() });
         let (low, high) = found.delay_interval_s;
         held += usize::from(low <= 0.0123 && 0.0123 <= high);
         steady += usize::from((found.delay_s - 0.0123).abs() < 1.96 * found.delay_std_s / 1.5);

@@ -38,10 +38,15 @@ fn evaluating_allocates_nothing() {
     let measured: Vec<f64> = (0..20_000).map(|i| (f64::from(i) * 0.01 - 0.05).sin()).collect();
     let pair = Pair::new(&target, &measured, 1000.0).unwrap();
     for config in [
-        EvaluatorConfig::default(),
-        EvaluatorConfig { data_decimation: 512, frequency_decimation: 2, ..Default::default() },
-        EvaluatorConfig { window: Window::Hann, detrend: Detrend::Linear, weight_power: 3, ..Default::default() },
-        EvaluatorConfig { decimator: Decimator::Chebyshev, data_decimation: 8, ..Default::default() },
+        EvaluatorConfig::published(),
+        EvaluatorConfig { data_decimation: 512, frequency_decimation: 2, ..EvaluatorConfig::published() },
+        EvaluatorConfig {
+            window: Window::Hann,
+            detrend: Some(Detrend::Linear),
+            weight_power: 3,
+            ..EvaluatorConfig::published()
+        },
+        EvaluatorConfig { decimator: Decimator::Chebyshev, data_decimation: 8, ..EvaluatorConfig::published() },
         EvaluatorConfig { estimator: Estimator::Aligned, ..Default::default() },
         EvaluatorConfig { estimator: Estimator::LeastSquares, ..Default::default() },
         EvaluatorConfig {
@@ -74,7 +79,7 @@ fn evaluating_allocates_nothing() {
     let evaluator = Evaluator::new(
         target.len(),
         1000.0,
-        EvaluatorConfig { estimator: Estimator::LeastSquares, detrend: Detrend::Mean, ..Default::default() },
+        EvaluatorConfig { estimator: Estimator::LeastSquares, detrend: Some(Detrend::Mean), ..Default::default() },
     )
     .unwrap();
     let mut state = evaluator.state();
@@ -88,7 +93,7 @@ fn evaluating_allocates_nothing() {
         assert_eq!(found.target_noise_std > 0.0, own, "{found:?}");
     }
     for (share, direct) in [(0.9, true), (0.99999, false)] {
-        let evaluator = EvaluatorConfig::default();
+        let evaluator = EvaluatorConfig::published();
         let key = KeyFrequencies::new(&target, 1000.0, KeyFrequenciesConfig { share, evaluator }).unwrap();
         assert_eq!(key.is_direct(), direct);
         let mut state = key.state();

@@ -33,7 +33,7 @@ fn by_definition(target: &[f64], measured: &[f64], config: &EvaluatorConfig) -> 
             / (0..x.len()).map(|i| (i as f64 - centre).powi(2)).sum::<f64>();
         x.iter()
             .enumerate()
-            .map(|(i, v)| match config.detrend {
+            .map(|(i, v)| match config.detrending() {
                 Detrend::None => *v,
                 Detrend::Mean => v - mean,
                 Detrend::Linear => v - mean - slope * (i as f64 - centre),
@@ -86,7 +86,7 @@ fn check(n: usize, config: EvaluatorConfig) {
 #[test]
 fn every_length_from_four_samples_on_follows_the_definition() {
     for n in (4..40).chain([63, 64, 65, 100, 127, 128, 129, 255, 257, 500]) {
-        check(n, EvaluatorConfig::default());
+        check(n, EvaluatorConfig::published());
     }
 }
 
@@ -95,7 +95,10 @@ fn every_setting_follows_the_definition() {
     for (_, window) in Window::NAMES {
         for (_, detrend) in Detrend::NAMES {
             for weight_power in [1, 2, 3, 4, 7] {
-                check(300, EvaluatorConfig { window, detrend, weight_power, ..Default::default() });
+                check(
+                    300,
+                    EvaluatorConfig { window, detrend: Some(detrend), weight_power, ..EvaluatorConfig::published() },
+                );
             }
         }
     }
@@ -105,9 +108,16 @@ fn every_setting_follows_the_definition() {
 fn folding_gives_the_bins_that_frequency_decimation_keeps() {
     for n in [300, 512, 700] {
         for frequency_decimation in [2, 4, 16, 64, 128] {
-            check(n, EvaluatorConfig { frequency_decimation, ..Default::default() });
-            check(n, EvaluatorConfig { frequency_decimation, window: Window::Hann, ..Default::default() });
-            check(n, EvaluatorConfig { frequency_decimation, detrend: Detrend::Linear, ..Default::default() });
+            check(n, EvaluatorConfig { frequency_decimation, ..EvaluatorConfig::published() });
+            check(n, EvaluatorConfig { frequency_decimation, window: Window::Hann, ..EvaluatorConfig::published() });
+            check(
+                n,
+                EvaluatorConfig {
+                    frequency_decimation,
+                    detrend: Some(Detrend::Linear),
+                    ..EvaluatorConfig::published()
+                },
+            );
         }
     }
 }
@@ -117,7 +127,7 @@ fn the_cascade_gives_the_bins_that_data_decimation_keeps() {
     for n in [2100, 4096, 5000] {
         for data_decimation in [2, 4, 8, 16, 32, 64, 256] {
             for frequency_decimation in [1, 2, 4] {
-                check(n, EvaluatorConfig { data_decimation, frequency_decimation, ..Default::default() });
+                check(n, EvaluatorConfig { data_decimation, frequency_decimation, ..EvaluatorConfig::published() });
             }
         }
     }
@@ -128,20 +138,20 @@ fn a_band_includes_both_its_ends() {
     let delta_f = RATE_HZ / 512.0;
     for (first, last) in [(1, 256), (3, 3), (10, 40), (256, 256)] {
         let band_hz = Some((first as f64 * delta_f, last as f64 * delta_f));
-        let config = EvaluatorConfig { band_hz, ..Default::default() };
+        let config = EvaluatorConfig { band_hz, ..EvaluatorConfig::published() };
         assert_eq!(Evaluator::new(300, RATE_HZ, config).unwrap().n_bins(), last - first + 1);
         check(300, config);
     }
-    check(300, EvaluatorConfig { band_hz: Some((0.0, 1e9)), ..Default::default() });
-    check(300, EvaluatorConfig { band_hz: Some((0.0, f64::MAX)), ..Default::default() });
-    check(300, EvaluatorConfig { band_hz: Some((1.0, 7.7)), frequency_decimation: 4, ..Default::default() });
+    check(300, EvaluatorConfig { band_hz: Some((0.0, 1e9)), ..EvaluatorConfig::published() });
+    check(300, EvaluatorConfig { band_hz: Some((0.0, f64::MAX)), ..EvaluatorConfig::published() });
+    check(300, EvaluatorConfig { band_hz: Some((1.0, 7.7)), frequency_decimation: 4, ..EvaluatorConfig::published() });
 }
 
 #[test]
 fn the_bins_behind_a_result_reproduce_it() {
     let (target, measured) = pair(5000);
     for data_decimation in [1, 16] {
-        let config = EvaluatorConfig { data_decimation, weight_power: 3, ..Default::default() };
+        let config = EvaluatorConfig { data_decimation, weight_power: 3, ..EvaluatorConfig::published() };
         let evaluator = Evaluator::new(5000, RATE_HZ, config).unwrap();
         let pair = Pair::new(&target, &measured, RATE_HZ).unwrap();
         let (tracking, spectra) = evaluator.evaluate_with_spectra(&mut evaluator.state(), &pair).unwrap();
@@ -172,7 +182,7 @@ fn without_decimation_the_real_part_is_that_of_the_time_domain() {
                 + alternating(x) * alternating(y) / n
         };
         let expected = product(&measured, &target) / product(&target, &target);
-        let evaluator = Evaluator::new(len, RATE_HZ, EvaluatorConfig::default()).unwrap();
+        let evaluator = Evaluator::new(len, RATE_HZ, EvaluatorConfig::published()).unwrap();
         let pair = Pair::new(&target, &measured, RATE_HZ).unwrap();
         let found = evaluator.evaluate(&mut evaluator.state(), &pair).unwrap();
         assert!((found.fei.re - expected).abs() < ROUND_OFF * expected.abs(), "{len}: {} {expected}", found.fei.re);
@@ -190,7 +200,7 @@ fn moving_readings_are_those_of_their_windows_bit_for_bit() {
         (3000, 64, 8, Window::Hann),
         (500, 250, 1, Window::Boxcar),
     ] {
-        let evaluator = EvaluatorConfig { data_decimation, window: shape, ..Default::default() };
+        let evaluator = EvaluatorConfig { data_decimation, window: shape, ..EvaluatorConfig::published() };
         let config = MovingConfig {
             window_s: window as f64 / RATE_HZ,
             hop_s: hop as f64 / RATE_HZ,
@@ -218,7 +228,7 @@ fn moving_readings_are_those_of_their_windows_bit_for_bit() {
 #[test]
 fn what_cannot_be_judged_is_an_error_that_names_it() {
     let (target, measured) = pair(300);
-    let config = EvaluatorConfig::default();
+    let config = EvaluatorConfig::published();
     let evaluate = |t: &[f64], m: &[f64], config| -> Result<_, Error> {
         let evaluator = Evaluator::new(t.len(), RATE_HZ, config)?;
         evaluator.evaluate(&mut evaluator.state(), &Pair::new(t, m, RATE_HZ)?)
@@ -267,7 +277,7 @@ fn what_cannot_be_judged_is_an_error_that_names_it() {
 #[test]
 fn signals_of_any_scale_are_judged_alike_or_refused() {
     let (target, measured) = pair(300);
-    let config = EvaluatorConfig::default();
+    let config = EvaluatorConfig::published();
     let evaluator = Evaluator::new(300, RATE_HZ, config).unwrap();
     let judge = |scale: f64| {
         let scaled = |x: &[f64]| -> Vec<f64> { x.iter().map(|v| v * scale).collect() };

@@ -52,12 +52,12 @@ fn change(found: &Tracking, reference: &Tracking) -> (f64, f64) {
 
 #[test]
 fn every_change_is_that_of_an_evaluation_and_the_choice_is_the_largest_that_qualifies() {
-    let plain = EvaluatorConfig::default();
+    let plain = EvaluatorConfig::published();
     let mut chosen = Vec::new();
     for (n, delay_s, config) in [
         (5000, 0.012, plain),
         (4096, 0.0, plain),
-        (1500, -0.02, EvaluatorConfig { window: Window::Hann, detrend: Detrend::Linear, ..plain }),
+        (1500, -0.02, EvaluatorConfig { window: Window::Hann, detrend: Some(Detrend::Linear), ..plain }),
         (3000, 0.012, EvaluatorConfig { weight_power: 3, ..plain }),
         (3000, 0.012, EvaluatorConfig { weight_power: 1, band_hz: Some((0.5, 40.0)), ..plain }),
     ] {
@@ -114,7 +114,7 @@ fn a_phase_at_half_a_turn_has_no_bound_and_nothing_larger_is_chosen() {
     let measured: Vec<f64> = target.iter().map(|x| -1.3 * x).collect();
     let pair = Pair::new(&target, &measured, RATE_HZ).unwrap();
     for weight_power in [1, 2, 5] {
-        let plan = EvaluatorConfig { weight_power, ..Default::default() };
+        let plan = EvaluatorConfig { weight_power, ..EvaluatorConfig::published() };
         let found = choose(&pair, plan, FactorsConfig { tolerance: 0.9, ..Default::default() }).unwrap();
         assert_eq!((found.data_decimation, found.frequency_decimation, found.delay_bound), (1, 1, 0.0));
         assert!(found.table[1..].iter().all(|entry| entry.delay.is_infinite()));
@@ -126,7 +126,7 @@ fn a_phase_at_half_a_turn_has_no_bound_and_nothing_larger_is_chosen() {
 fn a_given_factor_stays_and_the_other_is_counted_from_it() {
     let (target, measured) = pair(5000, 0.012);
     let pair = Pair::new(&target, &measured, RATE_HZ).unwrap();
-    let plain = EvaluatorConfig::default();
+    let plain = EvaluatorConfig::published();
     for (p, q) in [(Some(8), None), (None, Some(4)), (Some(2), Some(2))] {
         let config = FactorsConfig { data_decimation: p, frequency_decimation: q, ..Default::default() };
         let found = choose(&pair, plain, config).unwrap();
@@ -148,7 +148,7 @@ fn prior_bounds_are_safe() {
     let (target, measured) = pair(2000, 0.012);
     let pair = Pair::new(&target, &measured, RATE_HZ).unwrap();
     for weight_power in [1, 2, 4] {
-        let config = EvaluatorConfig { weight_power, ..Default::default() };
+        let config = EvaluatorConfig { weight_power, ..EvaluatorConfig::published() };
         let evaluator = Evaluator::new(2000, RATE_HZ, config).unwrap();
         let mut state = evaluator.state();
         let bounds = prior_bounds(&evaluator, &mut state, &pair).unwrap();
@@ -173,7 +173,7 @@ fn prior_bounds_are_safe() {
 fn what_cannot_be_chosen_is_an_error_that_names_it() {
     let (target, measured) = pair(600, 0.012);
     let pair = Pair::new(&target, &measured, RATE_HZ).unwrap();
-    let plain = EvaluatorConfig::default();
+    let plain = EvaluatorConfig::published();
     for tolerance in [0.0, 1.0, -0.1, f64::NAN, f64::INFINITY] {
         let message = choose(&pair, plain, FactorsConfig { tolerance, ..Default::default() }).unwrap_err().to_string();
         assert!(message.starts_with("tolerance must be a number between 0 and 1"), "{message}");
@@ -208,7 +208,7 @@ fn bin(x: &[f64], k: usize) -> Complex<f64> {
 
 #[test]
 fn key_frequencies_are_the_fewest_that_hold_the_share_and_only_they_are_summed() {
-    let plain = EvaluatorConfig::default();
+    let plain = EvaluatorConfig::published();
     let mut directly = Vec::new();
     for (n, share, config) in [
         (700, 0.99, plain),
@@ -259,7 +259,7 @@ fn key_frequencies_are_the_fewest_that_hold_the_share_and_only_they_are_summed()
 fn with_all_bins_key_frequencies_give_the_evaluation() {
     for window in [Window::Boxcar, Window::Hann] {
         for detrend in [Detrend::None, Detrend::Mean, Detrend::Linear] {
-            let config = EvaluatorConfig { window, detrend, ..Default::default() };
+            let config = EvaluatorConfig { window, detrend: Some(detrend), ..EvaluatorConfig::published() };
             let (target, measured) = pair(900, 0.012);
             let pair = Pair::new(&target, &measured, RATE_HZ).unwrap();
             let key =
@@ -287,7 +287,7 @@ fn the_droop_of_the_cascade_is_made_good_at_single_bins() {
 #[test]
 fn key_frequencies_of_a_first_window_serve_the_next() {
     let (target, measured) = pair(4096, 0.012);
-    let config = KeyFrequenciesConfig { share: 0.99, evaluator: EvaluatorConfig::default() };
+    let config = KeyFrequenciesConfig { share: 0.99, evaluator: EvaluatorConfig::published() };
     let key = KeyFrequencies::new(&target[..1024], RATE_HZ, config).unwrap();
     let mut state = key.state();
     let next = Pair::new(&target[500..1524], &measured[500..1524], RATE_HZ).unwrap();

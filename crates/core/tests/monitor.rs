@@ -64,7 +64,7 @@ fn configs() -> Vec<MonitorConfig> {
     let mut configs = Vec::new();
     for estimator in [Estimator::Fei, Estimator::LeastSquares, Estimator::Aligned] {
         for (data_decimation, frequency_decimation) in [(1, 1), (4, 1), (2, 4)] {
-            for (window, detrend) in [(Window::Boxcar, Detrend::Mean), (Window::Hann, Detrend::Linear)] {
+            for (window, detrend) in [(Window::Boxcar, None), (Window::Hann, Some(Detrend::Linear))] {
                 configs.push(MonitorConfig {
                     rate_hz: RATE_HZ,
                     window_s: 3.0,

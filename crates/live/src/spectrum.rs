@@ -89,7 +89,7 @@ mod tests {
 
     #[test]
     fn a_sine_has_its_amplitude_at_its_frequency() {
-        let evaluator = Evaluator::new(8192, 1024.0, EvaluatorConfig::default()).unwrap();
+        let evaluator = Evaluator::new(8192, 1024.0, EvaluatorConfig::published()).unwrap();
         let sine = |i: usize, a: f64| a * (std::f64::consts::TAU * 16.0 * i as f64 / 1024.0).sin();
         let column = |a: f64| (0..8192).map(|i| sine(i, a)).collect::<Vec<f64>>();
         let mut spectra = Spectra::new(&evaluator);

@@ -4,7 +4,7 @@ use std::net::UdpSocket;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use rthstrack::MonitorConfig;
+use rthstrack::{EvaluatorConfig, MonitorConfig};
 use rthstrack_live::{Live, LiveConfig, LiveError, LoggedReading};
 use serde_json::{Value, json};
 
@@ -16,7 +16,8 @@ fn opened(monitor: MonitorConfig, source: Value, alarms: Value, outputs: Value) 
 }
 
 fn usual_monitor() -> MonitorConfig {
-    MonitorConfig { rate_hz: 256.0, window_s: 1.0, update_hz: 32.0, ..MonitorConfig::default() }
+    let evaluator = EvaluatorConfig::published();
+    MonitorConfig { rate_hz: 256.0, window_s: 1.0, update_hz: 32.0, evaluator, ..MonitorConfig::default() }
 }
 
 fn usual_source() -> Value {

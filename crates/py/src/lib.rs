@@ -25,6 +25,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("LIVE_NUMBERS", PyTuple::new(m.py(), named::live_numbers())?)?;
     m.add_function(wrap_pyfunction!(settings::settings_table, m)?)?;
     m.add_function(wrap_pyfunction!(settings::checked_settings, m)?)?;
+    m.add_function(wrap_pyfunction!(settings::usual_detrend, m)?)?;
     m.add_class::<tracking::Evaluator>()?;
     m.add_function(wrap_pyfunction!(tracking::bridged, m)?)?;
     m.add_class::<key_frequencies::KeyFrequencies>()?;

@@ -153,6 +153,14 @@ pub(crate) fn checked_settings<'py>(
     }
 }
 
+/// What is subtracted before the window with this estimator, where nothing is asked for.
+#[pyfunction]
+pub(crate) fn usual_detrend(py: Python<'_>, estimator: &str) -> PyResult<&'static str> {
+    let mut config = EvaluatorConfig::default();
+    config.set("estimator", &Value::Text(estimator.to_owned())).unwrap_or(Ok(())).map_err(|error| to_py(py, &error))?;
+    Ok(config.detrending().code())
+}
+
 fn checked<'py, C: Configuration>(given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
     let py = given.py();
     let dict = PyDict::new(py);

@@ -114,31 +114,28 @@
     if (!m) return;
     const x = column(m.time);
     const shades = m.invalid.map(([from, to]) => ({ from, to }));
-    /* The estimate asked for, and in front of it the trusted one with its interval, where it is another. */
+    /* The published estimate or the one asked for, and in front of it the trusted one with its interval. */
     const chart = (host, name, label, unit, least, factor, whole, limits) => {
       const take = (key) => gaps(column(m[key]), factor);
       const [low, high] = name === "delay" ? ["delay_low_s", "delay_high_s"] : ["amplitude_low", "amplitude_high"];
       const key = name === "delay" ? "delay_s" : "amplitude";
-      const second = m.both ? [{ label: `trusted ${name}`, colour: "value", width: 1.5 }] : [];
+      const second = { label: `trusted ${name}`, colour: "value", width: 1.5 };
       const band = m.trusted_amplitude ? [take(high), take(low)] : [];
-      const ownLabel = m.both ? `${m.name} ${name}` : `${name}, ${m.label}`;
-      const first = { label: ownLabel, colour: m.both ? "third" : "value", width: 1.5 };
+      const first = { label: `${m.name} ${name}`, colour: "third", width: 1.5 };
       const edge = { label: "interval", colour: "interval", width: 0.5, silent: true };
-      const n = 1 + second.length;
       Charts.lines(host, {
         x: axis,
         y: { label, unit, least },
         height: 190,
         shades,
         limits,
-        data: [x, take(key), ...(m.both ? [take(`trusted_${key}`)] : []), ...band],
+        data: [x, take(key), take(`trusted_${key}`), ...band],
         references: [{ value: name === "delay" ? 0 : 1 }, ...reference(whole, "whole record", factor)],
-        series: [first, ...second, ...band.map(() => edge)],
-        intervals: band.length ? [[n + 1, n + 2]] : [],
+        series: [first, second, ...band.map(() => edge)],
+        intervals: band.length ? [[3, 4]] : [],
       });
     };
-    const overall =
-      m.both && a.trusted_delay_s !== null ? [a.trusted_amplitude, a.trusted_delay_s] : [a.amplitude, a.delay_s];
+    const overall = a.trusted_delay_s !== null ? [a.trusted_amplitude, a.trusted_delay_s] : [a.amplitude, a.delay_s];
     chart(
       host("moving-amplitude"),
       "amplitude",
@@ -157,7 +154,7 @@
       0.5,
       1e3,
       overall[1],
-      limitPair(a.limits.delay_s == null ? null : a.limits.delay_s * 1e3, 0, (v) => `${Charts.short(v)} ms`),
+      limitPair(a.limits.delay == null ? null : a.limits.delay * 1e3, 0, (v) => `${Charts.short(v)} ms`),
     );
   }
 
@@ -288,7 +285,7 @@
       1e3,
       ["delay_s", "delay_low_s", "delay_high_s"],
       [{ value: 0 }, ...reference(a.delay_s, "d", 1e3)],
-      limitPair(a.limits.delay_s == null ? null : a.limits.delay_s * 1e3, 0, (v) => `${Charts.short(v)} ms`),
+      limitPair(a.limits.delay == null ? null : a.limits.delay * 1e3, 0, (v) => `${Charts.short(v)} ms`),
     );
     Charts.lines(host("coherence"), {
       x: axis,

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rthstrack.cli.quantities import hertz, number, seconds, seconds_from_zero
 from rthstrack.cli.setting_options import spoken
 from rthstrack.errors import SettingError
 from rthstrack.evaluation.presets import PRESETS
@@ -35,14 +35,12 @@ def add_signals(parser: argparse.ArgumentParser, title: str) -> argparse._Argume
         help="unit of a channel (time too), or of all that are judged and state none",
     )
     rate = signals.add_mutually_exclusive_group()
-    rate.add_argument("--rate", type=positive, metavar="HZ", help="sampling rate, where the file does not say")
+    rate.add_argument("--rate", type=hertz, metavar="HZ", help="sampling rate, where the file does not say")
     rate.add_argument("--time", metavar="T", help="channel that holds the time")
-    signals.add_argument("--start", type=not_negative, metavar="S", help="leave out what comes before, in seconds")
-    signals.add_argument("--end", type=positive, metavar="S", help="leave out what comes after, in seconds")
+    signals.add_argument("--start", type=seconds_from_zero, metavar="S", help="leave out what comes before, in seconds")
+    signals.add_argument("--end", type=seconds, metavar="S", help="leave out what comes after, in seconds")
     signals.add_argument("--fill", type=count, metavar="SAMPLES", help="interpolate gaps of up to so many samples")
-    signals.add_argument(
-        "--resample", type=positive, metavar="HZ", help="interpolate uneven time stamps onto this rate"
-    )
+    signals.add_argument("--resample", type=hertz, metavar="HZ", help="interpolate uneven time stamps onto this rate")
     add_part(signals)
     return signals
 
@@ -123,28 +121,6 @@ def expected_delay_mistake(expected_delay_s: float | None, max_delay_s: float) -
     if expected_delay_s is None or abs(expected_delay_s) <= max_delay_s:
         return None
     return f"--expected-delay: expected at most --max-delay, {max_delay_s:g} s, found {expected_delay_s:g}"
-
-
-def number(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"expected a number, found '{text}'") from None
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"expected a finite number, found '{text}'")
-    return value
-
-
-def positive(text: str) -> float:
-    if (value := number(text)) <= 0:
-        raise argparse.ArgumentTypeError(f"expected a positive number, found '{text}'")
-    return value
-
-
-def not_negative(text: str) -> float:
-    if (value := number(text)) < 0:
-        raise argparse.ArgumentTypeError(f"expected zero or a positive number, found '{text}'")
-    return value
 
 
 def count(text: str) -> int:

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from rthstrack._core import settings_table
 from rthstrack.cli import addresses
-from rthstrack.cli.arguments import count, expected_delay_mistake, not_negative, positive
+from rthstrack.cli.arguments import count, expected_delay_mistake
+from rthstrack.cli.quantities import hertz, seconds, seconds_from_zero
 from rthstrack.cli.setting_options import SettingOption, setting_options
 from rthstrack.errors import ConfigurationError, SettingError, printable
 from rthstrack.evaluation.monitor import largest_decimation
@@ -90,7 +91,7 @@ def _add_input(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> None:
     add("--counter", _column, "COLUMN", "with --target: the counter's name or number ('counter', or 0 beside numbers)")
     group.add_argument("--no-counter", action="store_true", help="without --layout: samples bear no counter; losses "
                        "are then not seen")  # fmt: skip
-    add("--rate", positive, "HZ", "samples a second, of each actuator")
+    add("--rate", hertz, "HZ", "samples a second, of each actuator")
     add("--fill", _whole, "SAMPLES", "longest gap that is filled by a straight line; longer ones restart the window "
         "(5)")  # fmt: skip
     add("--allow", addresses.senders, "SENDER", "take datagrams of this machine only; may be repeated", action="append")
@@ -99,7 +100,7 @@ def _add_input(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> None:
 
 def _add_evaluation(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> None:
     add = _adder(group, wrong)
-    own = {"estimator": "least_squares", "update_hz": "16 Hz", "data_decimation": "the largest for which HI is at most "
+    own = {"update_hz": "16 Hz", "data_decimation": "the largest for which HI is at most "
            "rate / 4P", "band_hz": f"0 to {_HIGHEST_HZ:g} Hz, or a quarter of the rate if that is lower"}  # fmt: skip
     for option in setting_options("monitor", flags={"window": "--window-shape"}, defaults=own):
         if option.name not in _ELSEWHERE:
@@ -110,7 +111,7 @@ def _add_evaluation(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> No
 def _add_alarms(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> None:
     add = _adder(group, wrong)
     # 0 watches no silence; a limit of no lost sample at all is refused.
-    own = {"silence_s": not_negative, "limit_lost": count}
+    own = {"silence_s": seconds_from_zero, "limit_lost": count}
     for option in _alarm_options():
         add(option.flag, own.get(option.name, option.read), option.metavar, option.help)
     group.add_argument(
@@ -133,7 +134,7 @@ def _add_output(group: argparse._ArgumentGroup, wrong: dict[str, str]) -> None:
     add("--page-host", addresses.host, "HOST", "address that the page is served at (127.0.0.1: this machine only)")
     add("--page-name", addresses.host_name, "HOST", "a name by which browsers call this machine, besides localhost and "
         "its addresses; may be repeated", action="append")  # fmt: skip
-    add("--duration", positive, "S", "end after so long")
+    add("--duration", seconds, "S", "end after so long")
     how = group.add_mutually_exclusive_group()
     how.add_argument(
         "--quiet", action="store_true", help="no table, and nothing but alarms and errors on standard error"
@@ -284,7 +285,7 @@ def _monitor(args: argparse.Namespace, n_actuators: int, mistakes: list[str]) ->
     band = given["band_hz"]
     band = (0.0, min(_HIGHEST_HZ, rate / 4)) if band is None or None in band else tuple(band)
     update = given["update_hz"] or min(16.0, rate)
-    own = {"rate_hz": rate, "band_hz": band, "update_hz": update, "estimator": given["estimator"] or "least_squares",
+    own = {"rate_hz": rate, "band_hz": band, "update_hz": update,
            "data_decimation": given["data_decimation"] or largest_decimation(rate, band[1], update)}  # fmt: skip
     settings = dataclasses.asdict(MonitorSettings(rate))
     settings |= {name: value for name, value in given.items() if value is not None} | own

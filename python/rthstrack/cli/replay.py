@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rthstrack.cli import addresses
-from rthstrack.cli.arguments import add_signals, chosen, count, positive, told
+from rthstrack.cli.arguments import add_signals, chosen, count, told
 from rthstrack.cli.commands import COMMANDS
+from rthstrack.cli.quantities import positive
 from rthstrack.cli.running import Ended, say
 from rthstrack.errors import RecordingError, RthstrackError, SettingError
 from rthstrack.live.layout import DatagramLayout, default_layout, read_layout

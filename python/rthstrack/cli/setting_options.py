@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from rthstrack._core import checked_settings, settings_table
+from rthstrack.cli.quantities import number
 from rthstrack.errors import SettingError
 from rthstrack.evaluation.inputs import merged
 from rthstrack.evaluation.presets import PRESETS
@@ -75,7 +76,9 @@ def with_auto(option: SettingOption) -> SettingOption:
 
 def spoken(message: str) -> str:
     """A message of the library with the command's options in place of the names of its settings."""
-    names = {row["name"] for of in ("evaluation", "monitor") for row in settings_table(of)} | {"weight_powers"}
+    names = {row["name"] for of in ("evaluation", "monitor", "alarms") for row in settings_table(of)} | {
+        "weight_powers"
+    }
     return re.sub(
         r"\b(\w+)\b", lambda word: option_name(word[1]) if word[1] in names and "_" in word[1] else word[1], message
     )
@@ -101,7 +104,7 @@ def _reader(of: str, row: _SettingRow) -> Callable[[str], Any]:
     """From a word of the command line, checked by the core; what does not fit says what is expected."""
 
     def read(text: str) -> Any:
-        value = _value(row["kind"], text)
+        value = _value(row, text)
         try:
             checked_settings(of, {row["name"]: (value, value) if row["kind"] == "band" else value})
         except SettingError:
@@ -111,16 +114,13 @@ def _reader(of: str, row: _SettingRow) -> Callable[[str], Any]:
     return read
 
 
-def _value(kind: str, text: str) -> str | int | float:
-    """What a word is for a setting of this kind; a word that is no number stays one."""
-    if kind == "choice":
+def _value(row: _SettingRow, text: str) -> str | int | float:
+    """What a word is for a setting of this kind; a word that is no whole number stays one."""
+    if row["kind"] == "choice":
         return text
-    if kind in ("whole", "power_of_two"):
+    if row["kind"] in ("whole", "power_of_two"):
         return int(text) if text.isascii() and text.isdigit() else text
-    try:
-        return float(text)
-    except ValueError:
-        return text
+    return number(text, row["unit"])
 
 
 def _help(row: _SettingRow, default: str | None) -> str:

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rthstrack.cli.arguments import path, positive
+from rthstrack.cli.arguments import path
 from rthstrack.cli.commands import COMMANDS
+from rthstrack.cli.quantities import seconds
 from rthstrack.errors import ConfigurationError, SettingError
 from rthstrack.virtual_test.configuration import read_configuration
 from rthstrack.virtual_test.simulation import delay_damping, simulate, true_tracking
@@ -48,7 +49,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="write target, command, measured, force and, of a structure, displacements and ground motion, with the "
         "configuration inside; a file of this name is replaced",
     )
-    parser.add_argument("--duration", type=positive, metavar="S", help="seconds, instead of the configuration's")
+    parser.add_argument("--duration", type=seconds, metavar="S", help="seconds, instead of the configuration's")
     parser.add_argument("--seed", type=_seed, metavar="N", help="of the sensors' noise, instead of the configuration's")
     parser.set_defaults(run=lambda args: run(args, parser.error))
 

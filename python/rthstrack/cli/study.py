@@ -12,9 +12,10 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rthstrack.cli.arguments import add_method, add_signals, chosen, count, number, positive, told, tolerance
+from rthstrack.cli.arguments import add_method, add_signals, chosen, count, told, tolerance
 from rthstrack.cli.commands import COMMANDS
 from rthstrack.cli.progress import counted, stage
+from rthstrack.cli.quantities import positive, time
 from rthstrack.cli.setting_options import setting_options
 from rthstrack.errors import RthstrackError, SettingError
 from rthstrack.evaluation.factors import TOLERANCE
@@ -113,7 +114,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_signals(parser, "signals of recorded tests (a channel is named by name, path or #index)")
     truth = parser.add_argument_group("truth, in place of what a run or configuration says itself")
     truth.add_argument("--true-amplitude", type=positive, metavar="X", help="measured over target")
-    truth.add_argument("--true-delay", type=number, metavar="S", help="in seconds; positive: measured lags")
+    truth.add_argument("--true-delay", type=time, metavar="S", help="in seconds; positive: measured lags")
     method = add_method(parser)
     for option in setting_options("evaluation"):
         if option.name in _METHOD:

@@ -15,7 +15,7 @@ from rthstrack._core import KeyFrequencies as CoreKeyFrequencies
 from rthstrack._core import choose_factors as core_choose_factors
 from rthstrack._core import prior_bounds as core_prior_bounds
 from rthstrack.errors import SignalError
-from rthstrack.evaluation.inputs import _count, _number, _samples, _single, merged
+from rthstrack.evaluation.inputs import PUBLISHED, _count, _number, _samples, _single, merged, settled
 from rthstrack.evaluation.results import _Result
 from rthstrack.evaluation.settings import Settings
 from rthstrack.evaluation.tracking import _SPECTRA, Tracking, _plan, _tracked
@@ -210,7 +210,7 @@ def _windowed(
     data_decimation: int | None,
 ) -> WindowedFactors | None:
     """The first window that allows a larger Q than the chosen one, at no smaller P Q; None where none does."""
-    detrend = "mean" if base.detrend == "none" else base.detrend
+    detrend = base.detrend if base.detrend in ("mean", "linear") else "mean"
     windows = _WINDOWS if base.window == "boxcar" else (base.window,)
     for settings in (dataclasses.replace(base, window=window, detrend=detrend) for window in windows):
         if settings == base:
@@ -319,7 +319,7 @@ def key_frequencies(
     t = _samples("target", target)
     if t.ndim != 1:
         raise SignalError(f"one actuator at a time is taken here: pass one column, not an array of shape {t.shape}")
-    checked = merged(Settings, settings, changes)
+    checked = settled(merged(Settings, settings or PUBLISHED, changes))
     rate, wanted = _number("rate_hz", rate_hz), _number("share", share)
     plan = CoreKeyFrequencies(t, rate, wanted, checked)
     return KeyFrequencies(
@@ -329,5 +329,5 @@ def key_frequencies(
 
 def _without_factors(settings: Settings | None, changes: OtherKeywords) -> Settings:
     """Settings with changes at P = Q = 1: the factors are arguments of their own."""
-    whole = merged(Settings, settings, changes)
+    whole = settled(merged(Settings, settings or PUBLISHED, changes))
     return dataclasses.replace(whole, data_decimation=1, frequency_decimation=1)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import operator
-from dataclasses import fields
-from functools import cache
+from dataclasses import fields, replace
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from rthstrack._core import usual_detrend
 from rthstrack.errors import SettingError, SignalError, UnknownSettingError
-from rthstrack.evaluation.settings import Settings
+from rthstrack.evaluation.settings import MonitorSettings, MovingSettings, Settings
 from rthstrack.keyed_table import suggestion
 
 if TYPE_CHECKING:
@@ -52,6 +53,25 @@ def merged(kind: type[_Kind], settings: DataclassInstance | None, changes: Mappi
             raise
         near = suggestion(unknown[0], known) or f"; there are: {', '.join(known)}"
         raise UnknownSettingError(f"unknown setting {', '.join(unknown)}{near}") from None
+
+
+#: Settings of what is made of the published average alone.
+PUBLISHED = Settings(estimator="fei")
+
+
+_Estimated = TypeVar("_Estimated", Settings, MovingSettings, MonitorSettings)
+
+
+def settled(settings: _Estimated) -> _Estimated:
+    """The same with what follows from the estimator where nothing was asked for: what is subtracted."""
+    if settings.detrend is not None:
+        return settings
+    return _with_detrend(settings)  # type: ignore[no-any-return]
+
+
+@lru_cache(64)
+def _with_detrend(settings: Any) -> Any:
+    return replace(settings, detrend=usual_detrend(settings.estimator))
 
 
 @cache

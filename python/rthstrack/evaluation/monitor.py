@@ -11,7 +11,7 @@ import numpy as np
 from rthstrack._core import Monitor as CoreMonitor
 from rthstrack._core import causal_decimate as core_causal_decimate
 from rthstrack.errors import SettingError, SignalError
-from rthstrack.evaluation.inputs import _count, _samples, merged
+from rthstrack.evaluation.inputs import _count, _samples, merged, settled
 from rthstrack.evaluation.results import _made, _Numbers
 from rthstrack.evaluation.settings import MonitorSettings
 
@@ -82,7 +82,7 @@ class Monitor:
     >>> import numpy as np
     >>> t = np.arange(8192) / 1024
     >>> def motion(t): return np.sin(9 * t) + 0.3 * np.sin(23 * t) + 0.2 * np.cos(41 * t)
-    >>> monitor = Monitor(1024, update_hz=16, band_hz=(0, 32), data_decimation=None, estimator="least_squares")
+    >>> monitor = Monitor(1024, update_hz=16, band_hz=(0, 32), data_decimation=None)
     >>> for first in range(0, 8192, 1000):
     ...     block = t[first : first + 1000]
     ...     readings = monitor.process(motion(block), 0.95 * motion(block - 0.020))
@@ -107,7 +107,7 @@ class Monitor:
         is_chosen = "data_decimation" in given and given["data_decimation"] is None
         if is_chosen:
             given["data_decimation"] = 1
-        self.settings = merged(MonitorSettings, settings, given)
+        self.settings = settled(merged(MonitorSettings, settings, given))
         if is_chosen and (band_hz := self.settings.band_hz) is not None and band_hz[1] > 0:
             factor = largest_decimation(self.settings.rate_hz, band_hz[1], self.settings.update_hz)
             self.settings = dataclasses.replace(self.settings, data_decimation=factor)

@@ -49,6 +49,10 @@ class FrequencyResponse(_Result):
     rate_hz: float
     unaligned: str = ""
 
+    def columns(self) -> dict[str, NDArray[np.float64]]:
+        """Everything over frequency by name, the ends of the intervals apart: arrays (n_bins,)."""
+        return self._columns()
+
     def _columns(self) -> dict[str, Any]:
         names = ("frequency_hz", "gain", "phase_rad", "delay_s", "coherence", "target_psd", "measured_psd")
         columns = {name: getattr(self, name) for name in names}

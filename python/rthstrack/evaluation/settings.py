@@ -34,7 +34,8 @@ class Settings(_Checked):
     spectral or chebyshev.
     weight_power: l of Eqs 7 and 12: bins weigh |target|^l.
     window: Window over the record: boxcar, hann, hamming, blackman, flattop or tukey.
-    detrend: What is subtracted before the window: none, mean or linear.
+    detrend: What is subtracted before the window; where nothing is asked for the mean, of fei nothing: none, mean
+    or linear.
     band_hz, Hz: Lowest and highest frequency judged, both included.
     max_delay_s, s: Largest delay or lead looked for by all estimators but fei; where the record does not go on
     beyond what is judged, a quarter of that at most.
@@ -50,13 +51,13 @@ class Settings(_Checked):
 
     _of: ClassVar[str] = "evaluation"
 
-    estimator: str = "fei"
+    estimator: str = "least_squares"
     data_decimation: int = 1
     frequency_decimation: int = 1
     decimator: str = "spectral"
     weight_power: int = 2
     window: str = "boxcar"
-    detrend: str = "none"
+    detrend: str | None = None
     band_hz: tuple[float, float] | None = None
     max_delay_s: float = 0.25
     expected_delay_s: float | None = None
@@ -98,7 +99,8 @@ class MonitorSettings(_Checked):
     data_decimation: P, a power of two: keeps the frequencies up to rate / (2 P); of a monitor up to rate / (4 P).
     frequency_decimation: Q, a power of two: keeps every Q-th frequency bin.
     window: Window over the record: boxcar, hann, hamming, blackman, flattop or tukey.
-    detrend: What is subtracted before the window: none, mean or linear.
+    detrend: What is subtracted before the window; where nothing is asked for the mean, of fei nothing: none, mean
+    or linear.
     band_hz, Hz: Lowest and highest frequency judged, both included.
     max_delay_s, s: Largest delay or lead looked for by all estimators but fei; where the record does not go on
     beyond what is judged, a quarter of that at most.
@@ -115,11 +117,11 @@ class MonitorSettings(_Checked):
     update_hz: float = 64.0
     minimum_amplitude: float = 0.0
     n_actuators: int = 1
-    estimator: str = "fei"
+    estimator: str = "least_squares"
     data_decimation: int = 1
     frequency_decimation: int = 1
     window: str = "boxcar"
-    detrend: str = "mean"
+    detrend: str | None = None
     band_hz: tuple[float, float] | None = None
     max_delay_s: float = 0.25
     expected_delay_s: float | None = None
@@ -132,7 +134,8 @@ class StudyMethod:
     estimator: How gain and delay are estimated: fei, aligned or least_squares.
     decimator: How P is carried out, exactly on the bins of the undecimated transform or filtered as published:
     spectral or chebyshev.
-    detrend: What is subtracted before the window: none, mean or linear.
+    detrend: What is subtracted before the window; where nothing is asked for the mean, of fei nothing: none, mean
+    or linear.
     band_hz, Hz: Lowest and highest frequency judged, both included.
     max_delay_s, s: Largest delay or lead looked for by all estimators but fei; where the record does not go on
     beyond what is judged, a quarter of that at most.
@@ -148,7 +151,7 @@ class StudyMethod:
 
     estimator: str = "fei"
     decimator: str = "spectral"
-    detrend: str = "none"
+    detrend: str | None = None
     band_hz: tuple[float, float] | None = None
     max_delay_s: float = 0.25
     expected_delay_s: float | None = None
@@ -162,7 +165,7 @@ class StudyMethodKeywords(TypedDict, total=False):
 
     estimator: str
     decimator: str
-    detrend: str
+    detrend: str | None
     band_hz: tuple[float, float] | None
     max_delay_s: float
     expected_delay_s: float | None
@@ -178,7 +181,7 @@ class OtherKeywords(TypedDict, total=False):
     decimator: str
     weight_power: int
     window: str
-    detrend: str
+    detrend: str | None
     band_hz: tuple[float, float] | None
     max_delay_s: float
     expected_delay_s: float | None
@@ -211,7 +214,7 @@ class MonitorKeywords(TypedDict, total=False):
     data_decimation: int | None
     frequency_decimation: int
     window: str
-    detrend: str
+    detrend: str | None
     band_hz: tuple[float, float] | None
     max_delay_s: float
     expected_delay_s: float | None

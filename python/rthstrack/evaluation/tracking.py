@@ -20,7 +20,7 @@ from rthstrack._core import bridged as core_bridged
 from rthstrack._core import evaluate_moving as core_evaluate_moving
 from rthstrack.errors import RthstrackError, SignalError
 from rthstrack.evaluation.bad_samples import _bad_samples, bad_words
-from rthstrack.evaluation.inputs import _count, _number, _pair, merged, of_each
+from rthstrack.evaluation.inputs import _count, _number, _pair, merged, of_each, settled
 from rthstrack.evaluation.results import NUMBERS, _made, _Numbers
 from rthstrack.evaluation.settings import MovingSettings, Settings
 
@@ -156,7 +156,7 @@ class Evaluator:
         settings: Settings | None = None,
         **changes: Unpack[EvaluationKeywords],
     ) -> None:
-        self.settings = merged(Settings, settings, changes)
+        self.settings = settled(merged(Settings, settings, changes))
         self.n_samples = _count("n_samples", n_samples)
         self.rate_hz = _number("rate_hz", rate_hz)
         self._plan = _plan(self.n_samples, self.rate_hz, self.settings)
@@ -218,7 +218,7 @@ def evaluate(
     0.980, lags by 12.00 ms
     """
     t, m = _pair(target, measured)
-    settings = merged(Settings, settings, changes)
+    settings = settled(merged(Settings, settings, changes))
     rate_hz = _number("rate_hz", rate_hz)
     return _tracking(_plan(len(t), rate_hz, settings), settings, rate_hz, t, m, weights)
 
@@ -311,7 +311,7 @@ def evaluate_moving(
     Other arguments, shapes, signs and errors as in `evaluate`; SettingError for a window longer than the record.
     """
     t, m = _pair(target, measured)
-    whole, rate_hz = merged(MovingSettings, settings, changes), _number("rate_hz", rate_hz)
+    whole, rate_hz = settled(merged(MovingSettings, settings, changes)), _number("rate_hz", rate_hz)
     found: Any = _each_actuator(t, m, lambda x, y: core_evaluate_moving(x, y, rate_hz, whole))
     fields: dict[str, Any]
     if t.ndim == 1:

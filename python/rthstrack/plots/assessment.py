@@ -208,13 +208,13 @@ def plot_moving(
 ) -> Sequence[Axes] | NDArray[Any]:
     """A(t) and d(t) (ms) of moving windows, at their centres, on two axes; gaps where nothing could be determined.
 
-    An assessment gives the trusted estimate with its 95 % intervals as a band beside the one asked for, its limits
-    (dashed) and the whole record's trusted A and d (dotted).
+    An assessment gives the trusted estimate with its 95 % intervals as a band beside the published or the one asked
+    for, its limits (dashed) and the whole record's trusted A and d (dotted).
     """
     with _style():
         ax = _several(ax, 2, 2.8)
         assessment = result if isinstance(result, Assessment) else None
-        moving = result.moving if isinstance(result, Assessment) else result
+        moving = result.beside_moving if isinstance(result, Assessment) else result
         amplitude_axis, delay_axis = ax
         if moving is None:
             for one in ax:

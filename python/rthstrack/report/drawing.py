@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import dataclasses
 import hashlib
 from typing import TYPE_CHECKING, Any
 
@@ -84,7 +83,7 @@ def _drawing(a: Assessment, blocks: Blocks) -> dict[str, Any]:
         "trusted_amplitude": a.trusted.amplitude,
         "trusted_delay_s": a.trusted.delay_s,
         "equivalent_frequency_hz": a.tracking.equivalent_frequency_hz,
-        "limits": dataclasses.asdict(a.limits),
+        "limits": {gate.name: gate.limit for gate in a.gates},
         "time": _time_drawing(a, blocks),
         "histories": _histories_drawing(a, blocks),
         "moving": _moving_drawing(a, blocks),
@@ -151,7 +150,7 @@ def _histories_drawing(a: Assessment, blocks: Blocks) -> dict[str, Any]:
 
 
 def _moving_drawing(a: Assessment, blocks: Blocks) -> dict[str, Any] | None:
-    m = a.moving
+    m = a.beside_moving
     if m is None or m.time_s.size == 0:
         return None
     columns = {"amplitude": np.where(m.valid, m.amplitude, np.nan), "delay_s": np.where(m.valid, m.delay_s, np.nan)}
@@ -169,7 +168,6 @@ def _moving_drawing(a: Assessment, blocks: Blocks) -> dict[str, Any] | None:
         "drawn": m.time_s.size if kept is None else kept.size,
         "label": f"windows of {m.window_s:.4g} s",
         "name": display.ESTIMATORS[m.settings.estimator],
-        "both": a.trusted_moving is not a.moving,
         "time": blocks.column(_take(a.start_s + m.time_s, kept)),
         **{name: blocks.column(_take(column, kept)) for name, column in columns.items()},
         "invalid": invalid,

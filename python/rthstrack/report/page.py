@@ -120,6 +120,13 @@ def _json_block(name: str, content: Any) -> str:
     return f'<script type="application/json" id="{name}">{text.replace("<", chr(92) + "u003c")}</script>'
 
 
+_OUTCOMES = {
+    "passed": "within limits",
+    "exceeded": '<strong class="exceeded">limit exceeded</strong>',
+    "not_judged": '<strong class="not_judged">cannot be judged</strong>',
+}
+
+
 def _source(a: Assessment) -> str:
     """The file, or words for samples that did not come from one."""
     return a.file or "samples given in Python"
@@ -127,7 +134,7 @@ def _source(a: Assessment) -> str:
 
 def _name(a: Assessment, several_files: bool = True) -> str:
     parts = [Path(_source(a)).name] if several_files else []
-    parts.append(f"actuator {a.actuator}")
+    parts.append(f"actuator {a.actuator_number} ({a.actuator_name})")
     if a.part != "whole":
         parts.append(a.part)
     return " · ".join(parts)
@@ -149,10 +156,8 @@ def _summary(assessments: Sequence[Assessment]) -> str:
     for number, a in enumerate(assessments):
         t = a.tracking
         state = []
-        if a.exceeded:
-            state.append('<strong class="exceeded">limit exceeded</strong>')
-        elif a.limits.delay_s is not None or a.limits.amplitude is not None:
-            state.append("within limits")
+        if a.outcome is not None:
+            state.append(_OUTCOMES[a.outcome])
         if a.warnings:
             state.append(f"{len(a.warnings)} {'warning' if len(a.warnings) == 1 else 'warnings'}")
         numbers = (
@@ -164,7 +169,7 @@ def _summary(assessments: Sequence[Assessment]) -> str:
         rows.append(
             f'<tr data-assessment="{number}">'
             f'<th scope="row"><a href="#assessment-{number}">{escape(_source(a))}</a></th>'
-            f"<td>{a.actuator}</td><td>{escape(a.part)}</td>"
+            f"<td>{a.actuator_number}</td><td>{escape(a.part)}</td>"
             f'<td class="pair">{escape(a.target_name)} → {escape(a.measured_name)}</td>'
             + "".join(f'<td class="number">{text}</td>' for text in numbers)
             + f"<td>{', '.join(state)}</td></tr>"
@@ -211,7 +216,7 @@ def _heading(a: Assessment) -> str:
     what = {"compensator": "compensator alone", "actuator": "actuator alone"}.get(a.part, "")
     facts = [
         escape(_source(a)),
-        f"actuator {a.actuator}" + (f", {what}" if what else ""),
+        escape(f"actuator {a.actuator_number} ({a.actuator_name})") + (f", {what}" if what else ""),
         f"{escape(_signal(target_role, a.target_name))} → {escape(_signal(measured_role, a.measured_name))}",
         f"{_number('n_samples', int(a.target.size))} samples at {a.rate_hz:.6g} Hz",
     ]
@@ -219,8 +224,18 @@ def _heading(a: Assessment) -> str:
         f'<p class="facts">{" · ".join(facts)}</p>'
         f'<h2 class="verdict" data-field="verdict">{escape(a.verdict)}</h2>'
         f'<p class="argument" data-field="argument">{escape(a.argument)}</p>'
-        f"{_trusted_reason(a)}" + _notice("exceeded", ("Limit exceeded", "Limits exceeded"), a.exceeded)
+        f"{_trusted_reason(a)}{_conclusion(a)}"
     )
+
+
+def _conclusion(a: Assessment) -> str:
+    """The closing line of the limits, and what the delay does to the structure."""
+    line = ""
+    if a.outcome is not None:
+        line = f'<p class="conclusion {a.outcome}" data-field="conclusion">{escape(a.conclusion)}</p>'
+    if a.loop is not None:
+        line += f'<p class="argument" data-field="loop">Structure: {escape(a.loop.sentence)}.</p>'
+    return line
 
 
 def _trusted_reason(a: Assessment) -> str:
@@ -242,13 +257,13 @@ def _key_numbers(a: Assessment) -> str:
             "Amplitude A",
             _number("amplitude", amplitude, reason=reasons.get("amplitude")),
             _beside(a, "amplitude", "1 is perfect"),
-            _limit("limit_amplitude", "1 \N{PLUS-MINUS SIGN} ", abs(amplitude - 1), a.limits.amplitude),
+            _limit(a, "amplitude", "1 \N{PLUS-MINUS SIGN} "),
         ),
         (
             "Delay d",
             _number("delay_s", delay_s, "ms", 1e3, reasons.get("delay_s")),
             _beside(a, "delay_s", sense if math.isfinite(delay_s) else ""),
-            _limit("limit_delay_s", "\N{PLUS-MINUS SIGN}", abs(delay_s), a.limits.delay_s, "ms", 1e3),
+            _limit(a, "delay", "\N{PLUS-MINUS SIGN}", "ms", 1e3) + _limit(a, "critical_delay", "critical, ", "ms", 1e3),
         ),
         (
             "Phase",
@@ -270,31 +285,35 @@ def _key_numbers(a: Assessment) -> str:
 
 
 def _beside(a: Assessment, name: str, note: str) -> str:
-    """What the tile's number is, its interval if it has one, and the trusted one with its own."""
-    t = a.trusted
+    """What the tile's number is, its interval if it has one, and what stands beside it with its own."""
+    t = a.beside
+    which = "trusted" if t is a.trusted else "published"
     unit, factor = ("ms", 1e3) if name == "delay_s" else ("", 1.0)
     field = "delay_interval_s" if name == "delay_s" else "amplitude_interval"
     parts = [f"{display.ESTIMATORS[a.tracking.settings.estimator]}; {note}".removesuffix("; ")]
     own = float(getattr(a.tracking, name))
     if a.tracking.settings.estimator != "fei" and math.isfinite(own):
         parts.append(_interval(field, getattr(a.tracking, field), own, unit, factor) or "no interval")
-    if t is not a.tracking:
-        value = float(getattr(t, name))
-        parts.append(f"trusted: {_number(f'trusted_{name}', value, unit, factor)}")
+    value = float(getattr(t, name))
+    parts.append(f"{which}: {_number(f'{which}_{name}', value, unit, factor)}")
+    if which == "trusted":
         between = _interval(f"trusted_{field}", getattr(t, field), value, unit, factor)
         parts.append(between or ("no interval" if math.isfinite(value) else ""))
     return "<br>".join(part for part in parts if part)
 
 
-def _limit(field: str, sign: str, found: float, limit: float | None, unit: str = "", factor: float = 1.0) -> str:
-    if limit is None:
+def _limit(a: Assessment, name: str, sign: str, unit: str = "", factor: float = 1.0) -> str:
+    """A limit of a tile's number, and what became of it."""
+    gate = next((gate for gate in a.gates if gate.name == name), None)
+    if gate is None:
         return ""
-    if not math.isfinite(found):
-        state = NOT_DETERMINED
-    elif found > limit:
-        state = '<strong class="exceeded">\N{BLACK UP-POINTING TRIANGLE} exceeded</strong>'
-    else:
-        state = "kept"
+    field = f"limit_{name}" + ("_s" if unit else "")
+    state = {
+        "passed": "kept",
+        "exceeded": '<strong class="exceeded">\N{BLACK UP-POINTING TRIANGLE} exceeded</strong>',
+        "not_judged": '<strong class="not_judged">cannot be judged</strong>',
+    }[gate.state]
+    limit = gate.limit
     allowed = f'<data data-field="{field}" value="{limit!r}">{limit * factor:.4g}{" " if unit else ""}{unit}</data>'
     return f'<small>limit {sign}{allowed}: <span data-field="{field}_state">{state}</span></small>'
 

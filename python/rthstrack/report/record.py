@@ -24,17 +24,17 @@ NOT_DETERMINED = "not determined"
 def result_record(assessment: Assessment) -> dict[str, Any]:
     """The numbers of one assessment at full precision, ready for JSON; a number that is not determined is None."""
     a = assessment
-    record = result_entry(a) | {
+    record = result_entry(a)
+    # The page draws the curves.
+    del record["frequency_response"]
+    record |= {
         "part": a.part,
         "start_s": a.start_s,
         "indices": dataclasses.asdict(a.indices),
         "moving": None,
         "trusted_moving": None,
         "response": None,
-        "verdict": a.verdict,
         "warnings": a.warnings,
-        "limits": dataclasses.asdict(a.limits),
-        "exceeded": a.exceeded,
         "not_determined": _reasons(a),
     }
     if a.moving is not None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from rthstrack.errors import SettingError, SignalError
-from rthstrack.evaluation.inputs import _number, _single
+from rthstrack.evaluation.inputs import PUBLISHED, _number, _single
 from rthstrack.evaluation.tracking import evaluate
 from rthstrack.recording.chosen import read_chosen
 from rthstrack.virtual_test.configuration import read_configuration
@@ -50,7 +50,7 @@ class Pair:
         target, measured = _single(self.target, self.measured)
         rate_hz = _number("rate_hz", self.rate_hz)
         try:
-            evaluate(target, measured, rate_hz)
+            evaluate(target, measured, rate_hz, PUBLISHED)
         except SignalError as error:
             raise error.about(self.name) from None
         for name, value in (("target", target), ("measured", measured), ("rate_hz", rate_hz)):

@@ -11,7 +11,7 @@ import numpy as np
 
 from rthstrack.errors import SettingError
 from rthstrack.evaluation.factors import TOLERANCE
-from rthstrack.evaluation.inputs import _count, _number
+from rthstrack.evaluation.inputs import _count, _number, settled
 from rthstrack.evaluation.settings import Settings, StudyMethod, StudyMethodKeywords
 from rthstrack.evaluation.tracking import Evaluator
 
@@ -97,7 +97,7 @@ class StudySettings(StudyMethod):
 
     def _base(self) -> Settings:
         """What all cells share."""
-        return Settings(**{name: getattr(self, name) for name in _METHOD})
+        return settled(Settings(**{name: getattr(self, name) for name in _METHOD}))
 
     def _grid(self) -> list[tuple[int, int]]:
         most_p, most_q = self.combined or (math.inf, math.inf)

@@ -48,7 +48,8 @@ _NAMES = {
 
 def argument(
     target: NDArray[np.float64],
-    tracking: Tracking,
+    judged: Tracking,
+    beside: Tracking,
     trusted: Tracking,
     depends: Dependence | None,
     slopes: FrequencySlopes | None,
@@ -59,40 +60,44 @@ def argument(
 ) -> tuple[str, str | None]:
     """In one sentence, which number to use and why; and the code of that warning of `found` which it says itself.
 
-    `tracking` is the estimate asked for, with weights; `variants` are the same with one setting changed. `unit` is
-    target's; `start_s` the time of the first sample.
+    `judged` is the estimate asked for, `beside` what stands beside the trusted one (the same, or the published
+    average), with weights; `variants` are `beside` with one setting changed. `unit` is target's; `start_s` the time of
+    the first sample.
     """
     if (missing := _undetermined(trusted)) is not None:
-        said = "no number can be trusted here" if _undetermined(tracking) is None else "there is no number to use"
+        said = "no number can be trusted here" if _undetermined(beside) is None else "there is no number to use"
         return f"{said}: {_advised(missing, trusted)}", None
-    if (missing := _undetermined(tracking)) is not None:
-        asked_for = _NAMES[tracking.settings.estimator]
-        return f"use the trusted estimate: {asked_for} is not determined: {missing}", None
+    interval = "with its interval" if not trusted.reason else f"for which there is {trusted.reason}"
+    this = f"this is the trusted estimate, {interval}"
+    ours = _NAMES[beside.settings.estimator]
+    if (missing := _undetermined(beside)) is not None:
+        use = this if judged is trusted else "use the trusted estimate"
+        return f"{use}{'; ' if judged is trusted else ': '}{ours} is not determined: {missing}", None
     if depends is not None and (varying := _varying(depends, unit, start_s)) is not None:
         name, text = varying
-        return f"{text}; {_averages(tracking, trusted, name)}", "delay_spread"
+        return f"{text}; {_averages(beside, trusted, name)}", "delay_spread"
     if depends is None or depends.kind == "frequency":
         slowly = _varying_slowly(slopes)
     else:
         said = _in_words(depends, unit, start_s, _MINOR_CHANGE)
         slowly = f"; {said}" if said else ""
-    if tracking is trusted:
-        interval = "with its interval" if not trusted.reason else f"for which there is {trusted.reason}"
-        return f"this is the trusted estimate, {interval}{slowly}", None
-    ours = _NAMES[tracking.settings.estimator]
-    which = _differences(tracking, trusted)
+    which = _differences(beside, trusted)
     if not which:
-        return f"{ours} agrees with the trusted estimate {_how_well(tracking, trusted)}{slowly}", None
-    causes = [_cause(target, tracking, trusted, name, variants, found) for name in which]
+        if judged is trusted:
+            return f"{this}{slowly}; {ours} agrees with it {_how_well(beside, trusted)}", None
+        return f"{ours} agrees with the trusted estimate {_how_well(beside, trusted)}{slowly}", None
+    causes = [_cause(target, beside, trusted, name, variants, found) for name in which]
     if len({change for change, _, _ in causes}) == 1:
         # One cause, told of the number that is off by most.
-        at = max(range(len(which)), key=lambda i: _relative(which[i], tracking, trusted))
-        gaps = [f"{' and '.join(_gap(name, tracking, trusted) for name in which)}, {causes[at][2]}"]
+        at = max(range(len(which)), key=lambda i: _relative(which[i], beside, trusted))
+        gaps = [f"{' and '.join(_gap(name, beside, trusted) for name in which)}, {causes[at][2]}"]
     else:
-        gaps = [f"{_gap(name, tracking, trusted)}, {text}" for name, (_, _, text) in zip(which, causes, strict=True)]
+        gaps = [f"{_gap(name, beside, trusted)}, {text}" for name, (_, _, text) in zip(which, causes, strict=True)]
+    told = next((warning for _, warning, _ in causes if warning is not None), None)
+    if judged is trusted:
+        return f"{this}{slowly}; {ours} is {', and '.join(gaps)}", told
     # What follows the target is told by how gain and delay change.
     without = f"; {trusted.reason}" if trusted.reason_code not in ("", "residual_follows_target") else ""
-    told = next((warning for _, warning, _ in causes if warning is not None), None)
     return f"use the trusted estimate: {ours} is {', and '.join(gaps)}{slowly}{without}", told
 
 

@@ -14,7 +14,7 @@ from rthstrack.errors import SettingError, SignalError
 from rthstrack.evaluation.dependence import dependence
 from rthstrack.evaluation.factors import TOLERANCE, choose_factors
 from rthstrack.evaluation.indices import index_histories, indices
-from rthstrack.evaluation.inputs import _number, _single
+from rthstrack.evaluation.inputs import _number, _single, settled
 from rthstrack.evaluation.response import frequency_response, frequency_slopes
 from rthstrack.evaluation.settings import Settings
 from rthstrack.evaluation.tracking import Evaluator, bridged, evaluate_moving
@@ -22,8 +22,9 @@ from rthstrack.said import failed
 from rthstrack.verdict.argument import argument as argued
 from rthstrack.verdict.difference import differ
 from rthstrack.verdict.display import signal_roles
-from rthstrack.verdict.limits import Limits, copy_exceeds, exceeded, unchecked
-from rthstrack.verdict.sentence import reason, sentence, still_in_band, with_cause
+from rthstrack.verdict.limits import EXCEEDED, NOT_JUDGED, Limits, conclusion, gates, outcome
+from rthstrack.verdict.sentence import _undetermined, no_motion, reason, sentence, still_in_band, with_cause
+from rthstrack.verdict.warnings import OF_PUBLISHED
 from rthstrack.verdict.warnings import warnings as found_warnings
 
 if TYPE_CHECKING:
@@ -38,6 +39,9 @@ if TYPE_CHECKING:
     from rthstrack.evaluation.response import FrequencyResponse, FrequencySlopes
     from rthstrack.evaluation.tracking import MovingTracking, Tracking
     from rthstrack.said import Said
+    from rthstrack.verdict.limits import Gate
+    from rthstrack.verdict.loop import LoopEffect
+    from rthstrack.virtual_test.parts import VirtualTest
 
 #: Length of a moving window unless told otherwise, in seconds, but never more than a quarter of the record.
 MOVING_S = 4.0
@@ -52,11 +56,14 @@ class Assessment:
     `part` is "whole" (target to measured), "compensator" (target to command) or "actuator" (command to measured).
     `target` and `measured` are the raw samples, `unit` theirs; `time_s` starts at the recording's own start.
     `settings` holds what was done before the evaluation (cut, fill, resample, scale, rate and where it came from)
-    and the evaluation's own settings. `exceeded` names each limit that was exceeded, in one sentence.
-    `warnings`, `exceeded` and the notes are texts with `code` and `values`.
-    `tracking`, `moving` are of the estimator asked for; `trusted`, `trusted_moving` of least squares on every sample,
-    the same object where that was asked for. `variants`: where both differ, `tracking` with one setting changed, by
-    what was changed ("detrend", "window", "band", "estimator"). `argument` says in one sentence which to use, and why.
+    and the evaluation's own settings. `warnings` and the notes are texts with `code` and `values`.
+    `tracking`, `moving` are judged: by default `trusted`, `trusted_moving`, least squares on every sample, the same
+    objects then. `published`, `published_moving` are the published average of the same window, band, P and Q, the same
+    objects where that was asked for. `variants`: where `beside` differs from the trusted estimate, it with one setting
+    changed, by what was changed ("detrend", "window", "band", "estimator"). `argument` says in one sentence which to
+    use, and why.
+    `gates`: each limit with what was found, `conclusion` all of them in one line. `loop`: what the delay does to the
+    structure, where one was given.
     """
 
     file: str
@@ -74,6 +81,8 @@ class Assessment:
     moving_note: Said | None  # why there is no moving evaluation, when there is none
     trusted: Tracking
     trusted_moving: MovingTracking | None  # over the same windows
+    published: Tracking
+    published_moving: MovingTracking | None
     variants: Mapping[str, Tracking]
     response: FrequencyResponse | None  # aligned at the slopes' delay, or the trusted one
     response_note: Said | None
@@ -88,8 +97,45 @@ class Assessment:
     argument: str
     warnings: tuple[Said, ...]
     limits: Limits
-    exceeded: tuple[Said, ...]
+    gates: tuple[Gate, ...]
+    conclusion: str
+    loop: LoopEffect | None
     factors: Factors | None = None  # P and Q with their bound, where the program chose them
+
+    @property
+    def actuator_number(self) -> int:
+        """The actuator as people count, from 1."""
+        return self.actuator + 1
+
+    @property
+    def actuator_name(self) -> str:
+        """What it is called: its target's channel."""
+        return self.target_name
+
+    @property
+    def outcome(self) -> str | None:
+        """The worst state of all gates: "exceeded", "not_judged" or "passed"; None where nothing is limited."""
+        return outcome(self.gates)
+
+    @property
+    def exceeded(self) -> tuple[Said, ...]:
+        """Each limit that was exceeded, in one sentence."""
+        return tuple(gate.reason for gate in self.gates if gate.state == EXCEEDED)
+
+    @property
+    def not_judged(self) -> tuple[Said, ...]:
+        """Why a limit could not be judged."""
+        return tuple(dict.fromkeys(gate.reason for gate in self.gates if gate.state == NOT_JUDGED))
+
+    @property
+    def beside(self) -> Tracking:
+        """What stands beside the judged estimate: the trusted one, or where that is judged the published one."""
+        return self.published if self.tracking is self.trusted else self.trusted
+
+    @property
+    def beside_moving(self) -> MovingTracking | None:
+        """The moving windows that are drawn with the trusted ones: of the estimate asked for, or the published one."""
+        return self.published_moving if self.moving is self.trusted_moving else self.moving
 
 
 def assess(
@@ -103,6 +149,7 @@ def assess(
     moving_s: float | None = None,
     hop_s: float | None = None,
     limits: Limits | None = None,
+    structure: VirtualTest | None = None,
     file: str = "",
     actuator: int = 0,
     part: str = "whole",
@@ -120,13 +167,15 @@ def assess(
     choose: "P", "Q" or both are chosen within `tolerance` (`choose_factors`), in place of those in settings. They fit
     the whole record only: moving windows have 1 in their place.
     moving_s, hop_s: moving windows; by default 4 s but at most a quarter of the record, sixteen readings a window.
-    limits: apply to |delay| and |amplitude - 1|. `origin` says what was done to the samples before.
+    limits: what is allowed (`gates`). structure: the test whose only actuator this is; its critical delay at the
+    measured gain is a limit, too, unless one is given. `origin` says what was done to the samples before.
 
     Raises SignalError, SettingError; where only the moving evaluation or the frequency response is impossible, it is
     None and its note says why, unless `moving_s` or `hop_s` asked for it.
     """
     asked_for = settings or Settings()
     settings = without_trusted(asked_for)
+    limits = limits or Limits()
     t, m = _single(target, measured)
     rate_hz = _number("rate_hz", rate_hz)
     if not t.size:
@@ -134,7 +183,7 @@ def assess(
     factors = _chosen(t, m, rate_hz, settings, choose, tolerance) if choose else None
     for_record = settings if factors is None else factors.settings
     tracking = Evaluator(t.size, rate_hz, for_record).evaluate(t, m, weights=True)
-    still = still_in_band(t, tracking)
+    still = still_in_band(t, tracking) or no_motion(m)
     if still is not None:
         tracking = _without_numbers(tracking, still)
     for_windows = tracking.settings if factors is None else factors.reference.settings
@@ -147,21 +196,31 @@ def assess(
         trusted = Evaluator(t.size, rate_hz, of_trusted).evaluate(t, m)
         if still is not None:
             trusted = _without_numbers(trusted, still)
-    moving, trusted_moving, moving_note = None, None, None
+    _check_limits(limits, trusted)
+    of_published = published_settings(asked_for)
+    published = tracking
+    if settings.estimator != "fei":
+        published = Evaluator(t.size, rate_hz, of_published).evaluate(t, m, weights=True)
+        if still is not None:
+            published = _without_numbers(published, still)
+    moving, trusted_moving, published_moving, moving_note = None, None, None, None
     try:
         moving = _moving(t, m, rate_hz, window_s, hop_s, for_windows)
-        trusted_moving = moving
+        trusted_moving = published_moving = moving
         if moving.settings != of_trusted:
             trusted_moving = _moving(t, m, rate_hz, window_s, hop_s, of_trusted)
+        if settings.estimator != "fei":
+            published_moving = _moving(t, m, rate_hz, window_s, hop_s, of_published)
     except (SettingError, SignalError) as error:
         if asked:
             raise error.reworded(f"moving windows of {window_s:g} s: {error}") from None
-        moving, trusted_moving, moving_note = None, None, failed(error)
+        moving, trusted_moving, published_moving, moving_note = None, None, None, failed(error)
     # Curves over frequency and what gain and delay depend on need every sample.
-    raw, without_bad = (t, m), tracking
+    beside = published if tracking.settings == of_trusted else tracking
+    raw, without_bad = (t, m), beside
     if trusted.bad_samples:
         t, m = bridged(t, m, rate_hz, trusted)
-        without_bad = Evaluator(t.size, rate_hz, for_record).evaluate(t, m, weights=True)
+        without_bad = Evaluator(t.size, rate_hz, beside.settings).evaluate(t, m, weights=True)
     slopes, slopes_note = None, None
     # Where one delay explains measured, segments are aligned at it: bursts and drift would lead the search for another.
     explained = math.isfinite(float(trusted.delay_interval_s[0]))
@@ -177,19 +236,23 @@ def assess(
     same, trusted = tracking is trusted, with_cause(trusted, depends)
     if same:
         tracking = trusted
-    limits = limits or Limits()
     names = (target_name, measured_name)
     units = (unit, measured_unit or unit)
     found_indices = indices(t, m, rate_hz)
     warnings = found_warnings(
-        t, m, tracking, trusted, moving, response, found_indices.rms_error_percent, depends, units, names
+        t, m, tracking, published, trusted, moving, response, found_indices.rms_error_percent, depends, units, names
     )
     suspect = "mean" if "offset" in warnings and "drift" not in warnings else "linear"
-    variants = _variants(t, m, tracking, of_trusted, slopes, suspect) if differ(tracking, trusted) else {}
-    if without_bad is not tracking:
+    variants = _variants(t, m, beside, of_trusted, slopes, suspect) if differ(beside, trusted) else {}
+    if without_bad is not beside:
         variants["bad_samples"] = without_bad
-    argument, said = argued(t, tracking, trusted, depends, slopes, variants, warnings, unit, start_s)
+    argument, said = argued(t, tracking, beside, trusted, depends, slopes, variants, warnings, unit, start_s)
     copy = warnings.get("copy")
+    loop = None if structure is None or copy is not None else _loop(structure, trusted)
+    if loop is not None and limits.critical_delay_s is None:
+        limits = dataclasses.replace(limits, critical_delay_s=loop.critical_delay_s)
+    found_gates = gates(tracking, moving, limits, target=t, trusted=trusted, copy=copy, start_s=start_s)
+    told = {said} if tracking.settings.estimator == "fei" else {said, *OF_PUBLISHED}
     evaluation = dataclasses.asdict(tracking.settings) | _factor_settings(factors)
     evaluation["expected_delay_s"] = of_trusted.expected_delay_s
     return Assessment(
@@ -208,6 +271,8 @@ def assess(
         moving_note=moving_note,
         trusted=trusted,
         trusted_moving=trusted_moving,
+        published=published,
+        published_moving=published_moving,
         variants=variants,
         response=response,
         response_note=response_note,
@@ -218,14 +283,13 @@ def assess(
         indices=found_indices,
         histories=index_histories(t, m, rate_hz),
         settings=evaluation | {"moving_s": window_s, "hop_s": hop_s} | dict(origin or {}),
-        verdict=sentence(tracking, *signal_roles(part)),
+        verdict=_verdict(tracking, trusted, part, on_average=said == "delay_spread"),
         argument=argument if copy is None else f"no number says anything here: {copy.cause}",
-        warnings=(
-            *unchecked(tracking, limits),
-            *(warning for code, warning in warnings.items() if code != said),
-        ),
+        warnings=tuple(warning for code, warning in warnings.items() if code not in told),
         limits=limits,
-        exceeded=(*copy_exceeds(copy, limits), *exceeded(tracking, limits)),
+        gates=found_gates,
+        conclusion=conclusion(found_gates),
+        loop=loop,
         factors=factors,
     )
 
@@ -256,6 +320,35 @@ def trusted_settings(settings: Settings, expected_delay_s: float | None) -> Sett
         detrend="linear" if settings.detrend == "linear" else "mean",
         expected_delay_s=expected_delay_s,
     )
+
+
+def published_settings(settings: Settings) -> Settings:
+    """The published average with the same window, band, P and Q, and what it subtracts unless told otherwise."""
+    return settled(
+        dataclasses.replace(settings, estimator="fei", expected_delay_s=None, noise="white", noise_ratio=0.0)
+    )
+
+
+def _loop(structure: VirtualTest, trusted: Tracking) -> LoopEffect | None:
+    # What virtual tests need is loaded only where one is given.
+    from rthstrack.verdict.loop import loop_effect
+
+    return loop_effect(structure, trusted)
+
+
+def _verdict(tracking: Tracking, trusted: Tracking, part: str, *, on_average: bool) -> str:
+    """The headline. Where no number can be trusted it says so, whatever the estimate that was asked for reads."""
+    missing = _undetermined(trusted)
+    if tracking is trusted or missing is None or _undetermined(tracking) is not None:
+        return sentence(tracking, *signal_roles(part), on_average=on_average)
+    return f"no number can be trusted: {missing}"
+
+
+def _check_limits(limits: Limits, trusted: Tracking) -> None:
+    """Refuses a limit of the delay that no reading could exceed."""
+    quarter_s = trusted.n_samples / trusted.rate_hz / 4
+    bounds = ((trusted.settings.max_delay_s, "max_delay_s"), (quarter_s, "a quarter of the record"))
+    limits.check(*min(bounds))
 
 
 def _moving(

@@ -14,7 +14,7 @@ from rthstrack.verdict.sentence import reason
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from rthstrack.evaluation.response import FrequencySlopes
+    from rthstrack.evaluation.response import FrequencyResponse, FrequencySlopes
     from rthstrack.evaluation.tracking import Tracking
     from rthstrack.said import Said
     from rthstrack.verdict.assessment import Assessment
@@ -22,21 +22,27 @@ if TYPE_CHECKING:
 
 def result_entry(a: Assessment) -> dict[str, Any]:
     """One result as `rthstrack evaluate --json` prints it: numbers at full precision, None where not determined."""
-    t = a.tracking
+    t, moving = a.tracking, a.moving
+    warnings = (*a.warnings, *a.exceeded, *a.not_judged)
     entry: dict[str, Any] = {
         "file": a.file,
         "actuator": a.actuator,
+        "actuator_number": a.actuator_number,
+        "actuator_name": a.actuator_name,
         "target": a.target_name,
         "measured": a.measured_name,
         "unit": a.unit,
         "rate_hz": a.rate_hz,
+        "verdict": a.verdict,
+        "estimator": t.settings.estimator,
         "n_samples": t.n_samples,
         **numbers(t, NUMBERS[:4]),
         "n_bins": t.n_bins,
         "delta_f_hz": t.delta_f_hz,
         **numbers(t, [name for name in NUMBERS[4:] if name not in OF_TRUSTED]),
         **_told(reason(t)),
-        "trusted": _trusted_entry(a.trusted),
+        "trusted": _estimate_entry(a.trusted),
+        "published": _estimate_entry(a.published),
         "slopes": _slopes_entry(a.slopes, a.slopes_note),
         "depends_on": a.depends_on,
         "dependence": None if a.dependence is None else a.dependence.to_dict(),
@@ -44,10 +50,19 @@ def result_entry(a: Assessment) -> dict[str, Any]:
         # The force that others need is not given.
         "indices": {name: value for name, value in dataclasses.asdict(a.indices).items() if value is not None},
         "argument": a.argument,
-        "warnings": [*a.warnings, *a.exceeded],
-        "warning_codes": [
-            {"code": said.code, "values": said.values} for said in map(coded, (*a.warnings, *a.exceeded))
-        ],
+        "limits": dataclasses.asdict(a.limits),
+        "outcome": a.outcome,
+        "exceeded": a.exceeded,
+        "not_judged": a.not_judged,
+        "gates": [gate.to_dict() for gate in a.gates],
+        "conclusion": a.conclusion or None,
+        "loop": None if a.loop is None else a.loop.to_dict(),
+        "warnings": warnings,
+        "warning_codes": [{"code": said.code, "values": said.values} for said in map(coded, warnings)],
+        "moving": None if moving is None else {name: getattr(moving, name) for name in _MOVING},
+        "moving_note": a.moving_note,
+        "frequency_response": None if a.response is None else _curves(a.response),
+        "frequency_response_note": a.response_note,
     }
     return {key: json_ready(value) for key, value in entry.items()}
 
@@ -75,7 +90,19 @@ def _ends(interval: Any) -> list[float] | None:
     return ends if all(map(math.isfinite, ends)) else None
 
 
-def _trusted_entry(t: Tracking) -> dict[str, Any]:
+#: What JSON holds of the moving windows, arrays.
+_MOVING = (
+    "window_s", "hop_s", "time_s", "amplitude", "delay_s", "amplitude_interval", "delay_interval_s", "valid",
+    "reason_code",
+)  # fmt: skip
+
+
+def _curves(response: FrequencyResponse) -> dict[str, Any]:
+    """Gain and delay over frequency, a list each."""
+    return {name: json_ready(column) for name, column in response.columns().items()}
+
+
+def _estimate_entry(t: Tracking) -> dict[str, Any]:
     return {
         "estimator": t.settings.estimator,
         **numbers(t, ("amplitude", "amplitude_interval", "delay_s", "delay_interval_s", *OF_TRUSTED)),

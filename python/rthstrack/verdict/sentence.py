@@ -19,12 +19,20 @@ if TYPE_CHECKING:
 # An amplitude this near to one is called right: no displacement sensor of a test rig is better.
 _RIGHT_AMPLITUDE = 5e-4
 
+# A delay below this is none: no test rig's clocks agree better.
+_IN_TIME_S = 1e-7
+
 # A target is still in a band that holds less than this share of its motion, the step of a converter of 20 bits.
 _STILL = 1e-6
 
 
-def sentence(tracking: Tracking, target: str = "target", measured: str = "measured") -> str:
-    """The verdict, for example: measured lags target by 13.2 ms and is 1.8 % too large, judged at 0.9 Hz."""
+def sentence(
+    tracking: Tracking, target: str = "target", measured: str = "measured", *, on_average: bool = False
+) -> str:
+    """The verdict, for example: measured lags target by 13.2 ms and is 1.8 % too large, judged at 0.9 Hz.
+
+    `on_average`: gain or delay are not one number.
+    """
     delay_s, amplitude = float(tracking.delay_s), float(tracking.amplitude)
     if math.isnan(delay_s):
         said = _undetermined(tracking)
@@ -32,10 +40,12 @@ def sentence(tracking: Tracking, target: str = "target", measured: str = "measur
             return f"{measured} does not move: it has no delay"
         return f"not determined: {said}"
     milliseconds = f"{1e3 * abs(delay_s):.3g} ms"
-    if float(f"{1e3 * abs(delay_s):.3g}") == 0:
+    if abs(delay_s) < _IN_TIME_S:
         timing = f"{measured} is in time with {target}"
     else:
         timing = f"{measured} {'lags' if delay_s > 0 else 'leads'} {target} by {milliseconds}"
+    if on_average:
+        timing += " on average"
     excess = 100 * (amplitude - 1)
     if abs(amplitude - 1) < _RIGHT_AMPLITUDE:
         size = "has the right amplitude"
@@ -91,6 +101,11 @@ def still_in_band(target: NDArray[np.float64], tracking: Tracking) -> Said | Non
     if squares > (_STILL * float(target.std())) ** 2 * target.size:
         return None
     return undetermined(f"target does not move between {band[0]:.3g} and {band[1]:.3g} Hz", "still_in_band", band)
+
+
+def no_motion(measured: NDArray[np.float64]) -> Said | None:
+    """That measured stands still: what follows nothing has no delay, and is no matter of too little motion."""
+    return undetermined("measured does not move", *_NO_MOTION) if measured.min() == measured.max() else None
 
 
 def _undetermined(tracking: Tracking) -> Said | None:

@@ -49,10 +49,15 @@ _DELAY_SPREAD = 0.2
 _STANDS_OFF = 0.25
 
 
+#: What is said of the published average alone.
+OF_PUBLISHED = ("half_turn", "drift", "high_energy")
+
+
 def warnings(
     target: NDArray[np.float64],
     measured: NDArray[np.float64],
     tracking: Tracking,
+    published: Tracking,
     trusted: Tracking,
     moving: MovingTracking | None,
     response: FrequencyResponse | None,
@@ -63,7 +68,7 @@ def warnings(
 ) -> dict[str, Said]:
     """What makes the numbers less trustworthy than they look, by code, most serious first.
 
-    `tracking` carries its weights.
+    `tracking`, the estimate that is judged, and `published` carry their weights.
     """
     duration_s = tracking.n_samples / tracking.rate_hz
     # Of these channels what is clipped or held is told already.
@@ -71,14 +76,14 @@ def warnings(
     found = (
         copied(target, measured, names),
         _unlike_units(units, names),
-        _wrap(tracking, names),
+        _wrap(published, names),
         _odd_amplitude(tracking if math.isnan(float(trusted.amplitude)) else trusted, units),
         _bad_samples(trusted, names),
         _clipped(target, names[0], "clipped_target") if "target" not in told else None,
         _clipped(measured, names[1], "clipped_measured") if "measured" not in told else None,
         _offset(target, measured, trusted, rms_error_percent, units, names),
-        _drift(target, tracking, duration_s),
-        _high_energy(tracking),
+        _drift(target, published, duration_s),
+        _high_energy(published),
         _target_noise(target, trusted, names),
         _coherence(tracking, response, names),
         _delay_spread(tracking, trusted, response) if _by_frequency(depends) else None,

@@ -141,6 +141,11 @@ def virtual_test_from(table: Mapping[str, Any], file: str | os.PathLike[str] = "
     return _checked(parts, root, file)
 
 
+def read_virtual_test(path: str | os.PathLike[str]) -> VirtualTest:
+    """The test alone of a TOML file, whatever it says of the ground motion or target. Raises ConfigurationError."""
+    return virtual_test_from(read_toml(Path(path)), path)
+
+
 def to_table(test: VirtualTest, motion: Mapping[str, Any], duration_s: float | None) -> dict[str, Any]:
     """The table that `configuration_from` reads as the same test, with every value written out; fit for JSON.
 

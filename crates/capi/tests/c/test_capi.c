@@ -210,7 +210,7 @@ static void bad_settings_are_refused_in_one_line_that_names_them(void) {
     BAD(expected_delay_s, INFINITY);
     BAD(minimum_amplitude, -1.0);
     BAD(window, 6);
-    BAD(detrend, -1);
+    BAD(detrend, -2);
     BAD(estimator, 3);
     BAD(n_actuators, 0);
     BAD(data_decimation, 3);

@@ -464,7 +464,7 @@ impl Alignment {
             noise: config.noise,
             noise_ratio: config.noise_ratio,
             weight_power: config.weight_power,
-            detrend: config.detrend,
+            detrend: config.detrending(),
             moments: window.as_deref().map_or((0.0, 0.0), moments),
             window,
             search: Search::new(n_samples, rate_hz, config.max_delay_s),
@@ -1320,12 +1320,7 @@ impl Alignment {
         if let [only] = peaks.peaks() {
             return Some(only.lag);
         }
-        let config = EvaluatorConfig {
-            estimator: Estimator::LeastSquares,
-            max_delay_s: config.max_delay_s,
-            detrend: Detrend::Mean,
-            ..EvaluatorConfig::default()
-        };
+        let config = EvaluatorConfig { max_delay_s: config.max_delay_s, ..EvaluatorConfig::default() };
         let whole = Self::new(n, rate_hz, &config).ok()?;
         let mut state = whole.state();
         let best = whole.best(&mut state, &Judged::new(*view, 0, None), &peaks);

@@ -229,12 +229,17 @@ impl Alarms {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use rthstrack::{Monitor, MonitorConfig};
+    use rthstrack::{EvaluatorConfig, Monitor, MonitorConfig};
+
+    /// Of a tone, of which only the published average tells a delay.
+    fn config() -> MonitorConfig {
+        let evaluator = EvaluatorConfig::published();
+        MonitorConfig { rate_hz: 64.0, window_s: 1.0, update_hz: 1.0, evaluator, ..MonitorConfig::default() }
+    }
 
     /// A reading with these numbers, as the core would give it.
     pub(crate) fn reading(actuator: usize, time_s: f64, amplitude: f64, delay_s: f64) -> Reading {
-        let config = MonitorConfig { rate_hz: 64.0, window_s: 1.0, update_hz: 1.0, ..MonitorConfig::default() };
-        let monitor = Monitor::new(config).unwrap();
+        let monitor = Monitor::new(config()).unwrap();
         let mut state = monitor.state();
         let sample = |i: usize| [(i as f64 * 0.7).sin()];
         let mut made = (0..64).find_map(|i| monitor.step(&mut state, &sample(i), &sample(i)).map(|r| r[0])).unwrap();
@@ -245,8 +250,7 @@ pub(crate) mod tests {
     }
 
     fn invalid(time_s: f64) -> Reading {
-        let monitor =
-            Monitor::new(MonitorConfig { rate_hz: 64.0, window_s: 1.0, update_hz: 1.0, ..Default::default() }).unwrap();
+        let monitor = Monitor::new(config()).unwrap();
         let mut state = monitor.state();
         let mut made = (0..64).find_map(|_| monitor.step(&mut state, &[0.0], &[0.0]).map(|r| r[0])).unwrap();
         assert!(!made.is_valid());

@@ -92,7 +92,7 @@ def formulation(r: Results) -> Iterator[Claim]:
     gain, delay_s, f_hz = 1.1, 13.7e-3, 2.0
     t = np.arange(16384) / paper.RATE_HZ
     sine, late = np.sin(2 * np.pi * f_hz * t), gain * np.sin(2 * np.pi * f_hz * (t - delay_s))
-    read = evaluate(sine, late, paper.RATE_HZ)
+    read = evaluate(sine, late, paper.RATE_HZ, estimator="fei")
     found = float(read.amplitude), float(read.phase_rad), float(read.delay_s), float(read.equivalent_frequency_hz)
     expected = gain, -2 * np.pi * f_hz * delay_s, delay_s, f_hz
     yield judged(
@@ -146,7 +146,7 @@ def formulation(r: Results) -> Iterator[Claim]:
     yield setting(
         "2", "Eq 9: frequency interval", "fs / 2p", f"{cell.delta_f_hz:.7f} Hz (CHY101-N)", cell.delta_f_hz == df
     )
-    swapped = evaluate(run.measured, run.target, run.rate_hz)
+    swapped = evaluate(run.measured, run.target, run.rate_hz, estimator="fei")
     yield slip(
         "2",
         "the FEI is, in words, a weighted sum of F[I]/F[O]; in Eq 12 of F[O]/F[I]",
@@ -157,7 +157,7 @@ def formulation(r: Results) -> Iterator[Claim]:
         "Eq 12 is right, the sentence before it has the quotient upside down",
     )
     still = r.perfect["experiment-29"]
-    perfect = evaluate(still.target, still.measured, still.rate_hz)
+    perfect = evaluate(still.target, still.measured, still.rate_hz, estimator="fei")
     yield setting(
         "2",
         "perfect tracking: A = 1, d = 0",

@@ -303,7 +303,7 @@ def component_seen(component: Component, window: str) -> Seen:
 def read_run(run: Run, window: str) -> tuple[float, float]:
     """A and d of a run by window."""
     shape, detrend = WINDOWS[window]
-    found = evaluate(run.target, run.measured, run.rate_hz, window=shape, detrend=detrend)
+    found = evaluate(run.target, run.measured, run.rate_hz, estimator="fei", window=shape, detrend=detrend)
     return float(found.amplitude), float(found.delay_s)
 
 

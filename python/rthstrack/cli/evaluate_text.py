@@ -1,0 +1,193 @@
+"""What `rthstrack evaluate` prints."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from typing import TYPE_CHECKING
+
+from rthstrack.cli.evaluate_many import print_many
+from rthstrack.verdict import display
+from rthstrack.verdict.display import with_interval
+from rthstrack.verdict.sentence import reason
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from rich.console import Console
+    from rich.table import Table
+
+    from rthstrack.evaluation.tracking import MovingTracking, Tracking
+    from rthstrack.verdict.assessment import Assessment
+
+
+#: What many results may be sorted by.
+SORTED_BY = ("worst", "given", "file", "delay", "amplitude", "error")
+
+_PARTS = {"whole": "", "compensator": "compensator: ", "actuator": "actuator: "}
+_COLOURS = {"passed": "bold green", "exceeded": "bold red", "not_judged": "bold yellow"}
+# Into a file or pipe a table may be this wide.
+_PIPE_WIDTH = 200
+
+
+def print_text(results: Sequence[Sequence[Assessment]], n_files: int, sort: str) -> None:
+    """Prints one file's results in full, many files' in a table."""
+    from rich.console import Console
+
+    # Into a file or pipe nothing is folded at a terminal's width.
+    is_terminal = sys.stdout.isatty()
+    width = None if is_terminal or "COLUMNS" in os.environ else _PIPE_WIDTH
+    console = Console(highlight=False, soft_wrap=not is_terminal, width=width)
+    found = [a for one in results for a in one]
+    if n_files == 1:
+        several = len({a.actuator for a in found}) > 1
+        for a in found:
+            _print_one(console, a, several=several)
+    elif found:
+        print_many(console, found, sort)
+
+
+def called(a: Assessment) -> str:
+    """An actuator's number and name, as people read them."""
+    return f"actuator {a.actuator_number} ({a.actuator_name})"
+
+
+def _print_one(console: Console, a: Assessment, *, several: bool) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    t = a.tracking
+    which = f"{called(a)}: " if several else ""
+    console.print(Text(f"{which}{_PARTS[a.part]}{a.verdict}", style="bold"))
+    console.print(Text(a.argument))
+    console.print(_side_by_side(a))
+    table = Table(box=None, show_header=False, pad_edge=False)
+    table.add_column(style="dim", no_wrap=True)
+    table.add_column(overflow="fold")
+    band = "" if a.tracking.settings.band_hz is None else f", band {t.settings.band_hz}"
+    for label, value in (
+        ("file", f"{a.file}, {t.n_samples} samples at {a.rate_hz:g} Hz ({a.settings.get('rate_source', 'given')})"),
+        ("target, measured", f"{a.target_name}, {a.measured_name}"),
+        ("phase", _number(math.degrees(float(t.phase_rad)), ".5g", " degrees")),
+        ("bins", f"{t.n_bins}, every {t.delta_f_hz:.4g} Hz{band}"),
+        *_reason_rows(a),
+        *([("P and Q chosen", a.factors.sentence)] if a.factors else []),
+        *([("a larger Q", a.factors.windowed.sentence)] if a.factors and a.factors.windowed else []),
+        *_moving_rows(a),
+        *_index_rows(a),
+        *([("structure", a.loop.sentence)] if a.loop else []),
+    ):
+        table.add_row(label, Text(value))
+    console.print(table)
+    for warning in a.warnings:
+        console.print(Text("warning: ", style="yellow") + Text(warning))
+    if a.outcome is not None:
+        console.print(Text(a.conclusion, style=_COLOURS[a.outcome]))
+    console.print()
+
+
+def _side_by_side(a: Assessment) -> Table:
+    """The judged estimate, the trusted and the published one, with their 95 % intervals as far as there are any."""
+    from rich.table import Table
+    from rich.text import Text
+
+    columns: list[Tracking] = []
+    for t in (a.tracking, a.trusted, a.published):
+        if not any(t is one for one in columns):
+            columns.append(t)
+    table = Table(box=None, pad_edge=False)
+    table.add_column("", style="dim", no_wrap=True)
+    for t in columns:
+        table.add_column(_heading(a, t))
+    rows = [
+        ("amplitude", [_estimate(float(t.amplitude), t.amplitude_interval) for t in columns]),
+        (
+            "delay",
+            [_estimate(1e3 * float(t.delay_s), [1e3 * end for end in t.delay_interval_s], "ms") for t in columns],
+        ),
+        ("at", [_number(float(t.equivalent_frequency_hz), ".5g", " Hz") for t in columns]),
+    ]
+    for label, cells in rows:
+        table.add_row(label, *map(Text, cells))
+    return table
+
+
+def _heading(a: Assessment, t: Tracking) -> str:
+    """What an estimate is called; two of one estimator by what is subtracted before."""
+    if t is a.trusted:
+        said = "trusted (least squares"
+        differs = a.tracking.settings.estimator == "least_squares" and a.tracking is not a.trusted
+        return f"{said}, detrend {t.settings.detrend}), 95 % interval" if differs else f"{said}), 95 % interval"
+    called = display.estimator_in_full(t.settings.estimator)
+    return f"{called}, detrend {t.settings.detrend}" if t.settings.estimator == "least_squares" else called
+
+
+def _estimate(value: float, interval: Iterable[float], unit: str = "") -> str:
+    low, high = interval
+    if math.isfinite(value) and not math.isfinite(high - low):
+        return f"{value:.6g} {unit}".rstrip()
+    return with_interval(value, (low, high), unit)
+
+
+def _number(value: float, layout: str, unit: str) -> str:
+    return f"{value:{layout}}{unit}" if math.isfinite(value) else "not determined"
+
+
+def _windows_text(a: Assessment, moving: MovingTracking) -> str:
+    import numpy as np
+
+    known = moving.valid & np.isfinite(moving.delay_s)
+    if not known.any():
+        return f"no window could be judged{_most_frequent(moving)}"
+    delays, amplitudes = 1e3 * moving.delay_s[known], moving.amplitude[known]
+    (low, high), (small, large) = np.quantile(delays, (0.1, 0.9)), np.quantile(amplitudes, (0.1, 0.9))
+    return (
+        f"of {moving.window_s:g} s{_moving_factors(a, moving)}: delay {low:.4g} to {high:.4g} ms, "
+        f"amplitude {small:.4g} to {large:.4g} (10 to 90 % of {known.sum()} readings)"
+    )
+
+
+def _most_frequent(moving: MovingTracking) -> str:
+    counted = display.reasons(moving)
+    return f": {counted[0][1]}" if counted else ""
+
+
+def _reason_rows(a: Assessment) -> list[tuple[str, str]]:
+    """Why a number or an interval is missing, each reason once."""
+    rows = {}
+    for t in (a.tracking, a.trusted, a.published):
+        if why := reason(t):
+            rows[why] = ("not determined" if math.isnan(float(t.delay_s)) else "no interval", why.cause)
+    return list(rows.values())
+
+
+def _index_rows(a: Assessment) -> list[tuple[str, str]]:
+    """The indices that there are, those of one name in one row."""
+    own = {"unit": a.unit, "unit2": f"{a.unit}^2" if a.unit else None}
+    rows: dict[str, list[str]] = {}
+    for _, field, unit, scale, percent, _, name in display.INDICES:
+        value = getattr(a.indices, field)
+        if value is None:
+            continue
+        text = f"{scale * value:{'.3g' if unit == '%' else '.4g'}} {own.get(unit, unit) or ''}".rstrip()
+        beside = "" if percent is None else f" ({getattr(a.indices, percent):.3g} %)"
+        rows.setdefault(name, []).append(text + beside)
+    return [(name, ", ".join(texts)) for name, texts in rows.items()]
+
+
+def _moving_rows(a: Assessment) -> list[tuple[str, str]]:
+    if a.moving is None or a.trusted_moving is None:
+        return [("moving windows", a.moving_note or "")]
+    rows = [("moving windows", _windows_text(a, a.moving))]
+    if a.trusted_moving is not a.moving:
+        rows.append(("trusted, in them", _windows_text(a, a.trusted_moving)))
+    return rows
+
+
+def _moving_factors(a: Assessment, moving: MovingTracking) -> str:
+    """P and Q of the windows, where others were chosen for the record."""
+    if a.factors is None or moving is not a.moving:
+        return ""
+    s = moving.settings
+    return f" at P = {s.data_decimation}, Q = {s.frequency_decimation}"
