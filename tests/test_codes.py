@@ -127,7 +127,8 @@ def test_warnings_are_texts_with_code_and_values(tmp_path: Path, capsys: pytest.
     assert len(codes) == len(result["warnings"])
     assert {"channels_proposed", "odd_amplitude", "cut", "limit_delay"} <= set(codes)
     delay_s, limit_s = result["warning_codes"][codes.index("limit_delay")]["values"]
-    assert (delay_s, limit_s) == (abs(result["delay_s"]), 0.001)
+    (gate,) = result["gates"]
+    assert (delay_s, limit_s) == (gate["worst_window"]["value"], 0.001)
     assert "; ".join(codes) in table.read_text(encoding="utf-8")
 
 

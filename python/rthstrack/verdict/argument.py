@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -46,6 +46,17 @@ _NAMES = {
 }
 
 
+class Argument(NamedTuple):
+    """One sentence that says which number to use and why.
+
+    told: the code of that warning which it says itself. is_average: gain or delay are not one number each.
+    """
+
+    text: str
+    told: str | None = None
+    is_average: bool = False
+
+
 def argument(
     target: NDArray[np.float64],
     judged: Tracking,
@@ -57,8 +68,8 @@ def argument(
     found: Mapping[str, Said],
     unit: str | None = None,
     start_s: float = 0.0,
-) -> tuple[str, str | None]:
-    """In one sentence, which number to use and why; and the code of that warning of `found` which it says itself.
+) -> Argument:
+    """Which number to use and why.
 
     `judged` is the estimate asked for, `beside` what stands beside the trusted one (the same, or the published
     average), with weights; `variants` are `beside` with one setting changed. `unit` is target's; `start_s` the time of
@@ -66,16 +77,16 @@ def argument(
     """
     if (missing := _undetermined(trusted)) is not None:
         said = "no number can be trusted here" if _undetermined(beside) is None else "there is no number to use"
-        return f"{said}: {_advised(missing, trusted)}", None
+        return Argument(f"{said}: {_advised(missing, trusted)}")
     interval = "with its interval" if not trusted.reason else f"for which there is {trusted.reason}"
     this = f"this is the trusted estimate, {interval}"
     ours = _NAMES[beside.settings.estimator]
     if (missing := _undetermined(beside)) is not None:
         use = this if judged is trusted else "use the trusted estimate"
-        return f"{use}{'; ' if judged is trusted else ': '}{ours} is not determined: {missing}", None
+        return Argument(f"{use}{'; ' if judged is trusted else ': '}{ours} is not determined: {missing}")
     if depends is not None and (varying := _varying(depends, unit, start_s)) is not None:
         name, text = varying
-        return f"{text}; {_averages(beside, trusted, name)}", "delay_spread"
+        return Argument(f"{text}; {_averages(beside, trusted, name)}", "delay_spread", is_average=True)
     if depends is None or depends.kind == "frequency":
         slowly = _varying_slowly(slopes)
     else:
@@ -84,8 +95,8 @@ def argument(
     which = _differences(beside, trusted)
     if not which:
         if judged is trusted:
-            return f"{this}{slowly}; {ours} agrees with it {_how_well(beside, trusted)}", None
-        return f"{ours} agrees with the trusted estimate {_how_well(beside, trusted)}{slowly}", None
+            return Argument(f"{this}{slowly}; {ours} agrees with it {_how_well(beside, trusted)}")
+        return Argument(f"{ours} agrees with the trusted estimate {_how_well(beside, trusted)}{slowly}")
     causes = [_cause(target, beside, trusted, name, variants, found) for name in which]
     if len({change for change, _, _ in causes}) == 1:
         # One cause, told of the number that is off by most.
@@ -95,10 +106,10 @@ def argument(
         gaps = [f"{_gap(name, beside, trusted)}, {text}" for name, (_, _, text) in zip(which, causes, strict=True)]
     told = next((warning for _, warning, _ in causes if warning is not None), None)
     if judged is trusted:
-        return f"{this}{slowly}; {ours} is {', and '.join(gaps)}", told
+        return Argument(f"{this}{slowly}; {ours} is {', and '.join(gaps)}", told)
     # What follows the target is told by how gain and delay change.
     without = f"; {trusted.reason}" if trusted.reason_code not in ("", "residual_follows_target") else ""
-    return f"use the trusted estimate: {ours} is {', and '.join(gaps)}{slowly}{without}", told
+    return Argument(f"use the trusted estimate: {ours} is {', and '.join(gaps)}{slowly}{without}", told)
 
 
 def _advised(missing: Said, trusted: Tracking) -> str:

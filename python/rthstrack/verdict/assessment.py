@@ -246,13 +246,13 @@ def assess(
     variants = _variants(t, m, beside, of_trusted, slopes, suspect) if differ(beside, trusted) else {}
     if without_bad is not beside:
         variants["bad_samples"] = without_bad
-    argument, said = argued(t, tracking, beside, trusted, depends, slopes, variants, warnings, unit, start_s)
+    argument = argued(t, tracking, beside, trusted, depends, slopes, variants, warnings, unit, start_s)
     copy = warnings.get("copy")
     loop = None if structure is None or copy is not None else _loop(structure, trusted)
     if loop is not None and limits.critical_delay_s is None:
         limits = dataclasses.replace(limits, critical_delay_s=loop.critical_delay_s)
     found_gates = gates(tracking, moving, limits, target=t, trusted=trusted, copy=copy, start_s=start_s)
-    told = {said} if tracking.settings.estimator == "fei" else {said, *OF_PUBLISHED}
+    told = {argument.told} if tracking.settings.estimator == "fei" else {argument.told, *OF_PUBLISHED}
     evaluation = dataclasses.asdict(tracking.settings) | _factor_settings(factors)
     evaluation["expected_delay_s"] = of_trusted.expected_delay_s
     return Assessment(
@@ -283,8 +283,8 @@ def assess(
         indices=found_indices,
         histories=index_histories(t, m, rate_hz),
         settings=evaluation | {"moving_s": window_s, "hop_s": hop_s} | dict(origin or {}),
-        verdict=_verdict(tracking, trusted, part, on_average=said == "delay_spread"),
-        argument=argument if copy is None else f"no number says anything here: {copy.cause}",
+        verdict=_verdict(tracking, trusted, part, on_average=argument.is_average),
+        argument=argument.text if copy is None else f"no number says anything here: {copy.cause}",
         warnings=tuple(warning for code, warning in warnings.items() if code not in told),
         limits=limits,
         gates=found_gates,
