@@ -16,6 +16,7 @@ from numpy.testing import assert_allclose
 
 import rthstrack
 import tracking_twin as twin
+from published import published, published_moving
 from tolerances import physical, round_off
 
 FULL = physical(1e-9, "relative")
@@ -30,7 +31,7 @@ def assert_agrees(
     target: twin.Floats, measured: twin.Floats, rate_hz: float, tolerance: float, **evaluation: Any
 ) -> None:
     """FEI, equivalent frequency and delay of both; FEI's error is relative to its size, the delay's follows from it."""
-    ours = rthstrack.evaluate(target, measured, rate_hz, **evaluation)
+    ours = published(target, measured, rate_hz, **evaluation)
     theirs = twin.evaluate(target, measured, rate_hz, **evaluation)
     assert ours.n_bins == theirs["n_bins"]
     assert ours.delta_f_hz == theirs["delta_f_hz"]
@@ -176,7 +177,7 @@ def test_chebyshev_evaluates_the_shortest_record_its_padding_allows_and_refuses_
     assert_agrees(target, measured, 100.0, DECIMATED, data_decimation=2, decimator="chebyshev")
     for length in range(4, CHEBYSHEV_LEAST):
         with pytest.raises(rthstrack.SignalError, match=f"{length} samples .*{CHEBYSHEV_LEAST}"):
-            rthstrack.evaluate(target[:length], measured[:length], 100.0, data_decimation=2, decimator="chebyshev")
+            published(target[:length], measured[:length], 100.0, data_decimation=2, decimator="chebyshev")
     # Without decimation there is nothing to filter and nothing to refuse.
     assert_agrees(target[:4], measured[:4], 100.0, FULL, decimator="chebyshev")
 
@@ -218,7 +219,7 @@ def test_moving_readings_agree_with_the_twins_slices(
         "window": window,
         "detrend": detrend,
     }
-    ours = rthstrack.evaluate_moving(target, measured, rate, **setting)
+    ours = published_moving(target, measured, rate, **setting)
     theirs = twin.evaluate_moving(target, measured, rate, **setting)
     assert_allclose(ours.time_s, theirs["time_s"], rtol=round_off(4, 1), atol=0)
     assert ours.valid.tolist() == theirs["valid"].tolist()
@@ -234,7 +235,7 @@ def test_moving_readings_agree_with_the_twins_slices(
 def test_long_moving_evaluation_agrees_with_the_twins_slices() -> None:
     rate = 1024.0
     target, measured = earthquake_like(24577, rate)
-    ours = rthstrack.evaluate_moving(target, measured, rate, window_s=4.0, hop_s=0.5, data_decimation=16)
+    ours = published_moving(target, measured, rate, window_s=4.0, hop_s=0.5, data_decimation=16)
     theirs = twin.evaluate_moving(target, measured, rate, window_s=4.0, hop_s=0.5, data_decimation=16)
     assert ours.valid.tolist() == theirs["valid"].tolist()
     assert 10 < ours.valid.sum() < len(ours.valid)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 import rthstrack
 import tracking_twin as twin
+from published import published, published_evaluator, published_moving
 from tolerances import EXACT, physical, round_off
 
 RATE = 256.0
@@ -67,9 +68,7 @@ def test_a_pure_gain_is_recovered_with_no_delay(
     seed: int, length: int, gain: float, power: int, window: str, detrend: str, decimation: dict[str, Any]
 ) -> None:
     target = noise(length, seed)
-    r = rthstrack.evaluate(
-        target, gain * target, RATE, weight_power=power, window=window, detrend=detrend, **decimation
-    )
+    r = published(target, gain * target, RATE, weight_power=power, window=window, detrend=detrend, **decimation)
     assert_allclose(r.amplitude, gain, rtol=round_off(16, length), atol=0)
     assert_allclose(r.phase_rad, 0.0, rtol=0, atol=round_off(16, length))
     assert_allclose(r.delay_s, 0.0, rtol=0, atol=round_off(16, length, 1 / r.equivalent_frequency_hz))
@@ -78,7 +77,7 @@ def test_a_pure_gain_is_recovered_with_no_delay(
 @given(seeds, st.integers(64, 1200))
 def test_a_reversed_sensor_reads_half_a_turn(seed: int, length: int) -> None:
     target = noise(length, seed)
-    r = rthstrack.evaluate(target, -target, RATE)
+    r = published(target, -target, RATE)
     assert_allclose(r.amplitude, 1.0, rtol=round_off(16, length), atol=0)
     assert_allclose(abs(r.phase_rad), math.pi, rtol=round_off(16, length), atol=0)
 
@@ -94,7 +93,7 @@ def test_a_sine_gives_back_gain_and_fractional_delay_up_to_half_a_turn(
     delay = half_turns / (2 * f)
     target = np.sin(2 * np.pi * f * t + start)
     measured = gain * np.sin(2 * np.pi * f * (t - delay) + start)
-    r = rthstrack.evaluate(target, measured, RATE, weight_power=power, band_hz=(f, f))
+    r = published(target, measured, RATE, weight_power=power, band_hz=(f, f))
     assert r.n_bins == 1
     assert_allclose(r.equivalent_frequency_hz, f, rtol=round_off(4, 1), atol=0)
     assert_allclose(r.amplitude, gain, rtol=round_off(64, n), atol=0)
@@ -114,7 +113,7 @@ def test_a_circular_fractional_delay_gives_the_weighted_mean_of_its_phasors(
     I_k[[0, -1]] = 0
     turn = np.exp(-2j * np.pi * f * delay)
     target, measured = np.fft.irfft(I_k, n), np.fft.irfft(gain * turn * I_k, n)
-    r = rthstrack.evaluate(target, measured, RATE, weight_power=power, data_decimation=P)
+    r = published(target, measured, RATE, weight_power=power, data_decimation=P)
     kept = slice(1, n // 2 // P + 1)
     weight = np.abs(I_k[kept]) ** power
     weight /= weight.sum()
@@ -130,7 +129,7 @@ def test_a_narrow_band_delay_is_recovered_within_the_methods_own_error(delay: fl
     late = np.exp(-(((t - delay - 8) / 2.5) ** 2))
     target = envelope * np.sin(2 * np.pi * 2 * t)
     measured = gain * late * np.sin(2 * np.pi * 2 * (t - delay))
-    r = rthstrack.evaluate(target, measured, RATE)
+    r = published(target, measured, RATE)
     assert_allclose(r.delay_s, delay, rtol=0, atol=physical(0.01, "%") * abs(delay) + physical(1e-3, "us"))
     assert_allclose(r.amplitude, gain, rtol=physical(0.1, "%"), atol=0)
 
@@ -144,12 +143,12 @@ def test_every_signed_quantity_is_positive_on_lag_and_negative_on_lead(delay: fl
     target, measured = np.sin(2 * np.pi * 2 * t), np.sin(2 * np.pi * 2 * (t - delay))
     spring = 3.0 * measured
 
-    whole = rthstrack.evaluate(target, measured, RATE)
+    whole = published(target, measured, RATE)
     assert_allclose(whole.delay_s, delay, rtol=physical(1, "%"))
     assert math.copysign(1, whole.phase_rad) == -sign
     assert math.copysign(1, whole.fei.imag) == -sign
 
-    moving = rthstrack.evaluate_moving(target, measured, RATE, window_s=4.0, hop_s=1.0, window="hann")
+    moving = published_moving(target, measured, RATE, window_s=4.0, hop_s=1.0, window="hann")
     assert moving.valid.all()
     assert_allclose(moving.delay_s, delay, rtol=physical(5, "%"))
     assert (np.sign(moving.phase_rad) == -sign).all()
@@ -188,8 +187,8 @@ def test_time_run_backwards_turns_lag_into_lead(
         "data_decimation": P,
         "frequency_decimation": Q,
     }
-    forwards = rthstrack.evaluate(target, measured, RATE, **kw)
-    backwards = rthstrack.evaluate(target[::-1], measured[::-1], RATE, **kw)
+    forwards = published(target, measured, RATE, **kw)
+    backwards = published(target[::-1], measured[::-1], RATE, **kw)
     tolerance = physical(1e-9 if P == 1 else 1e-6, "relative")
     assert_allclose(backwards.fei, np.conj(forwards.fei), rtol=tolerance, atol=0)
     assert_allclose(backwards.equivalent_frequency_hz, forwards.equivalent_frequency_hz, rtol=tolerance, atol=0)
@@ -205,8 +204,8 @@ def test_scaling_either_signal_scales_the_amplitude_and_leaves_the_delay(
     target, measured = noise((2, length), seed)
     measured = measured + np.roll(target, 1)
     kw: dict[str, Any] = {"weight_power": power, "window": window, "detrend": detrend, **decimation}
-    plain = rthstrack.evaluate(target, measured, RATE, **kw)
-    scaled = rthstrack.evaluate(a * target, b * measured, RATE, **kw)
+    plain = published(target, measured, RATE, **kw)
+    scaled = published(a * target, b * measured, RATE, **kw)
     tolerance = physical(1e-9 if "data_decimation" not in decimation else 1e-6, "relative")
     assert_allclose(scaled.fei, plain.fei * b / a, rtol=tolerance, atol=0)
     assert_allclose(scaled.equivalent_frequency_hz, plain.equivalent_frequency_hz, rtol=tolerance, atol=0)
@@ -221,8 +220,8 @@ def test_exchanging_actuators_exchanges_their_results(
     target = noise((length, 4), seed)
     measured = 0.3 * noise((length, 4), seed + 1) + np.roll(target, 2, axis=0)
     kw: dict[str, Any] = {"window": window, **decimation}
-    straight = rthstrack.evaluate(target, measured, RATE, **kw)
-    permuted = rthstrack.evaluate(target[:, order], measured[:, order], RATE, **kw)
+    straight = published(target, measured, RATE, **kw)
+    permuted = published(target[:, order], measured[:, order], RATE, **kw)
     for j, source in enumerate(order):
         for name, value in column(permuted, j).items():
             assert np.array_equal(value, column(straight, source)[name], equal_nan=True), name
@@ -235,10 +234,10 @@ def test_several_actuators_in_one_call_are_each_evaluated_as_if_alone(
     target = noise((length, n), seed)
     measured = 0.3 * noise((length, n), seed + 1) + np.roll(target, 2, axis=0)
     kw: dict[str, Any] = {"window": window, "detrend": detrend, "weight_power": power, **decimation}
-    together = rthstrack.evaluate(target, measured, RATE, weights=True, **kw)
+    together = published(target, measured, RATE, weights=True, **kw)
     assert np.shape(together.amplitude) == (n,)
     for j in range(n):
-        alone = rthstrack.evaluate(target[:, j].copy(), measured[:, j].copy(), RATE, weights=True, **kw)
+        alone = published(target[:, j].copy(), measured[:, j].copy(), RATE, weights=True, **kw)
         for name, value in numbers(alone).items():
             assert np.array_equal(value, column(together, j)[name], equal_nan=True), name
 
@@ -250,9 +249,9 @@ def test_several_actuators_in_moving_windows_are_each_evaluated_as_if_alone(
     target = noise((length, n), seed)
     measured = 0.3 * noise((length, n), seed + 1) + np.roll(target, 2, axis=0)
     kw: dict[str, Any] = {"window_s": 0.4, "hop_s": 0.1, "window": "hann", "data_decimation": P}
-    together = rthstrack.evaluate_moving(target, measured, RATE, **kw)
+    together = published_moving(target, measured, RATE, **kw)
     for j in range(n):
-        alone = rthstrack.evaluate_moving(target[:, j].copy(), measured[:, j].copy(), RATE, **kw)
+        alone = published_moving(target[:, j].copy(), measured[:, j].copy(), RATE, **kw)
         for name, value in numbers(alone).items():
             assert np.array_equal(value, column(together, j)[name], equal_nan=True), name
 
@@ -264,8 +263,8 @@ def test_several_actuators_in_moving_windows_are_each_evaluated_as_if_alone(
 def test_folding_the_record_selects_every_qth_bin(seed: int, length: int, Q: int, window: str, detrend: str) -> None:
     target, measured = noise((2, length), seed)
     kw: dict[str, Any] = {"window": window, "detrend": detrend, "weights": True}
-    full = rthstrack.evaluate(target, measured, RATE, **kw)
-    folded = rthstrack.evaluate(target, measured, RATE, frequency_decimation=Q, **kw)
+    full = published(target, measured, RATE, **kw)
+    folded = published(target, measured, RATE, frequency_decimation=Q, **kw)
     assert folded.n_bins == full.n_bins // Q
     for name in ("frequency_hz", "target_spectrum", "measured_spectrum"):
         every, selected = getattr(full, name), getattr(folded, name)
@@ -276,8 +275,8 @@ def test_folding_the_record_selects_every_qth_bin(seed: int, length: int, Q: int
 @given(seeds, st.integers(64, 1200), st.sampled_from([2, 4, 8]), windows)
 def test_the_bins_of_p_are_the_lowest_of_the_whole_transform(seed: int, length: int, P: int, window: str) -> None:
     target, measured = noise((2, length), seed)
-    full = rthstrack.evaluate(target, measured, RATE, window=window, weights=True)
-    limited = rthstrack.evaluate(target, measured, RATE, window=window, data_decimation=P, weights=True)
+    full = published(target, measured, RATE, window=window, weights=True)
+    limited = published(target, measured, RATE, window=window, data_decimation=P, weights=True)
     assert limited.n_bins == full.n_bins // P
     for name in ("frequency_hz", "target_spectrum", "measured_spectrum"):
         every, selected = getattr(full, name), getattr(limited, name)
@@ -290,7 +289,7 @@ def test_the_bins_of_p_are_the_lowest_of_the_whole_transform(seed: int, length: 
 @given(seeds, st.integers(4, 1200), powers)
 def test_weights_sum_to_one_and_make_fei_and_f_eq(seed: int, length: int, power: int) -> None:
     target, measured = noise((2, length), seed)
-    r = rthstrack.evaluate(target, measured, RATE, weight_power=power, weights=True)
+    r = published(target, measured, RATE, weight_power=power, weights=True)
     assert r.weights is not None
     assert r.frequency_hz is not None
     assert r.target_spectrum is not None
@@ -315,7 +314,7 @@ def test_parsevals_theorem_gives_the_real_part_without_a_transform(
     # A target of next to nothing but its mean leaves the sums too little to divide by.
     total = float(np.sum(target**2))
     without_mean = total - target.sum() ** 2 / 2 ** math.ceil(math.log2(length))
-    r = rthstrack.evaluate(target, measured, RATE)
+    r = published(target, measured, RATE)
     scale = math.sqrt(total * float(np.sum(measured**2))) / without_mean
     assert_allclose(r.fei.real, twin.parseval_real_fei(target, measured), rtol=0, atol=round_off(16, length, scale))
 
@@ -327,7 +326,7 @@ def test_zeros_appended_up_to_the_power_of_two_change_nothing(seed: int, length:
     padded = np.zeros((2, n))
     padded[:, :length] = target, measured
     kw: dict[str, Any] = {"weight_power": power, "frequency_decimation": Q}
-    a, b = rthstrack.evaluate(target, measured, RATE, **kw), rthstrack.evaluate(*padded, RATE, **kw)
+    a, b = published(target, measured, RATE, **kw), published(*padded, RATE, **kw)
     assert a.n_bins == b.n_bins
     assert_allclose(a.fei, b.fei, rtol=physical(1e-9, "relative"), atol=0)
     assert_allclose(a.equivalent_frequency_hz, b.equivalent_frequency_hz, rtol=physical(1e-9, "relative"), atol=0)
@@ -336,7 +335,7 @@ def test_zeros_appended_up_to_the_power_of_two_change_nothing(seed: int, length:
 @given(seeds, st.integers(64, 600), st.floats(0.5, 2000.0))
 def test_the_rate_only_stretches_time(seed: int, length: int, rate: float) -> None:
     target, measured = noise((2, length), seed)
-    one, other = rthstrack.evaluate(target, measured, 1.0), rthstrack.evaluate(target, measured, rate)
+    one, other = published(target, measured, 1.0), published(target, measured, rate)
     assert other.fei == one.fei
     assert_allclose(other.equivalent_frequency_hz, rate * one.equivalent_frequency_hz, rtol=round_off(8, length))
     assert_allclose(other.delay_s, one.delay_s / rate, rtol=round_off(8, length))
@@ -350,13 +349,13 @@ def test_a_plan_used_again_gives_the_same_bits_as_a_call_of_its_own(
     seed: int, length: int, decimation: dict[str, Any], window: str, detrend: str, power: int
 ) -> None:
     kw: dict[str, Any] = {"window": window, "detrend": detrend, "weight_power": power, **decimation}
-    evaluator = rthstrack.Evaluator(length, RATE, **kw)
+    evaluator = published_evaluator(length, RATE, **kw)
     pairs = [tuple(noise((2, length), seed + i)) for i in range(3)]
     first = [evaluator.evaluate(*pair) for pair in pairs]
     again = [evaluator.evaluate(*pair) for pair in reversed(pairs)][::-1]
     for pair, a, b in zip(pairs, first, again, strict=True):
         assert_same_bits(a, b)
-        assert_same_bits(a, rthstrack.evaluate(*pair, RATE, **kw))
+        assert_same_bits(a, published(*pair, RATE, **kw))
 
 
 def test_evaluating_does_not_touch_the_callers_arrays() -> None:
@@ -368,8 +367,8 @@ def test_evaluating_does_not_touch_the_callers_arrays() -> None:
         {"data_decimation": 4},
         {"data_decimation": 4, "decimator": "chebyshev"},
     ):
-        rthstrack.evaluate(target, measured, RATE, **kw)
-    rthstrack.evaluate_moving(target, measured, RATE, window_s=0.5, hop_s=0.1, detrend="mean")
+        published(target, measured, RATE, **kw)
+    published_moving(target, measured, RATE, window_s=0.5, hop_s=0.1, detrend="mean")
     rthstrack.frequency_response(target, measured, RATE)
     rthstrack.indices(target, measured, RATE)
     rthstrack.index_histories(target, measured, RATE)
@@ -396,7 +395,7 @@ def test_the_latest_plans_are_kept_up_to_so_many_samples(monkeypatch: pytest.Mon
 def test_threads_share_a_plan_and_get_the_same_bits(seed: int) -> None:
     from concurrent.futures import ThreadPoolExecutor
 
-    evaluator = rthstrack.Evaluator(2000, RATE, window="hann")
+    evaluator = published_evaluator(2000, RATE, window="hann")
     pairs = [tuple(noise((2, 2000), seed + i)) for i in range(16)]
     alone = [evaluator.evaluate(*pair) for pair in pairs]
     with ThreadPoolExecutor(4) as pool:

@@ -18,6 +18,7 @@ from numpy.testing import assert_allclose
 import make_golden
 import rthstrack
 import tracking_twin as twin
+from published import published, published_moving
 from tolerances import physical, round_off
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -75,7 +76,7 @@ def _shared_pair(name: str) -> tuple[twin.Floats, twin.Floats]:
 def test_package_gives_the_shared_reference_value(case: dict[str, Any]) -> None:
     settings = {KEYS[key]: tuple(v) if isinstance(v, list) else v for key, v in case["settings"].items()}
     target, measured = _shared_pair(case["pair"])
-    ours = rthstrack.evaluate(target, measured, case["rate_hz"], **settings)
+    ours = published(target, measured, case["rate_hz"], **settings)
     assert ours.n_bins == case["n_bins"]
     assert ours.delta_f_hz == case["delta_f_hz"]
     for name in NUMBERS:
@@ -153,7 +154,7 @@ def _assert_alike(a: Any, b: Any, path: str = "golden") -> None:
 def test_package_gives_the_golden_value(case: dict[str, Any]) -> None:
     rate, target, measured, _ = _golden_signal(case["signal"])
     settings = _settings(case)
-    ours = rthstrack.evaluate(target, measured, rate, **settings)
+    ours = published(target, measured, rate, **settings)
     assert ours.n_bins == case["n_bins"]
     assert ours.delta_f_hz == case["delta_f_hz"]
     tolerance = _tolerance(settings)
@@ -173,7 +174,7 @@ def test_package_gives_the_golden_value(case: dict[str, Any]) -> None:
 def test_package_gives_the_golden_moving_readings(case: dict[str, Any]) -> None:
     rate, target, measured, _ = _golden_signal(case["signal"])
     settings = _settings(case)
-    ours = rthstrack.evaluate_moving(target, measured, rate, **settings)
+    ours = published_moving(target, measured, rate, **settings)
     assert_allclose(ours.time_s, case["time_s"], rtol=round_off(4, 1), atol=0)
     assert ours.valid.tolist() == case["valid"]
     assert len(case["valid"]) > 2
