@@ -10,6 +10,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rthstrack import configuration as configuration
+    from rthstrack import errors as errors
+    from rthstrack import evaluation as evaluation
+    from rthstrack import ground_motion as ground_motion
+    from rthstrack import plots as plots
+    from rthstrack import recording as recording
+    from rthstrack import report as report
+    from rthstrack import reproduction as reproduction
+    from rthstrack import studies as studies
+    from rthstrack import units as units
+    from rthstrack import verdict as verdict
+    from rthstrack import virtual_test as virtual_test
     from rthstrack._core import __version__ as __version__
     from rthstrack.errors import ChannelError as ChannelError
     from rthstrack.errors import ConfigurationError as ConfigurationError

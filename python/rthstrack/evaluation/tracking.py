@@ -23,6 +23,7 @@ from rthstrack.evaluation.bad_samples import _bad_samples, bad_words
 from rthstrack.evaluation.inputs import _count, _number, _pair, merged, of_each
 from rthstrack.evaluation.results import NUMBERS, _made, _Numbers
 from rthstrack.evaluation.settings import MovingSettings, Settings
+from rthstrack.values import Shown, value_range
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 _T = TypeVar("_T")
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Tracking(_Numbers["float | NDArray[np.float64]", "tuple[float, float] | NDArray[np.float64]"]):
     """Amplitude and delay of measured over target for one record (Eqs 6-12, or by alignment).
 
@@ -66,6 +67,17 @@ class Tracking(_Numbers["float | NDArray[np.float64]", "tuple[float, float] | ND
     target_spectrum: NDArray[np.complex128] | None = None
     measured_spectrum: NDArray[np.complex128] | None = None
 
+    def _shown(self) -> Shown:
+        each: list[tuple[str, str]] = []
+        if not isinstance(self.reason, str):
+            n = len(self.reason)
+            told = (", ".join(f"{label} {text}" for label, text in self._number_rows(i)) for i in range(n))
+            each = [(f"actuator {i}", text) for i, text in enumerate(told, start=1)]
+        of = f" of {len(each)} actuators" if each else ""
+        heading = f"Tracking{of}, {self.settings.estimator}: {self.n_samples} samples at {self.rate_hz:g} Hz"
+        why = dict.fromkeys([self.reason] if isinstance(self.reason, str) else self.reason)
+        return Shown(heading, [*(each or self._number_rows()), *(("", text) for text in why if text)])
+
     def _columns(self) -> dict[str, Any]:
         several = isinstance(self.reason, tuple)
         each: dict[str, Any] = {
@@ -85,7 +97,7 @@ class Tracking(_Numbers["float | NDArray[np.float64]", "tuple[float, float] | ND
         )
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class MovingTracking(_Numbers["NDArray[np.float64]", "NDArray[np.float64]"]):
     """The same over moving windows: arrays (n_readings,) or (n_readings, n_actuators), intervals with (low, high) last.
 
@@ -105,6 +117,15 @@ class MovingTracking(_Numbers["NDArray[np.float64]", "NDArray[np.float64]"]):
     reason: tuple[str, ...] | tuple[tuple[str, ...], ...]
     reason_code: tuple[str, ...] | tuple[tuple[str, ...], ...]
     reason_values: tuple[tuple[float, ...], ...] | tuple[tuple[tuple[float, ...], ...], ...]
+
+    def _shown(self) -> Shown:
+        of = f" of {self.amplitude.shape[1]} actuators" if self.amplitude.ndim > 1 else ""
+        n, known = self.valid.size, np.count_nonzero(self.valid)
+        windows = f"{n} windows of {self.window_s:g} s, one every {self.hop_s:g} s, {known} judged"
+        span = value_range(self.time_s, 1.0, "s")
+        return Shown(
+            f"MovingTracking{of}, {self.settings.estimator}: {windows}", [*self._number_rows(), ("centres", span)]
+        )
 
     def _columns(self) -> dict[str, Any]:
         n_actuators = 1 if self.amplitude.ndim == 1 else self.amplitude.shape[1]

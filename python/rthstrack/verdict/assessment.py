@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rthstrack.errors import SettingError, SignalError
@@ -18,7 +18,8 @@ from rthstrack.evaluation.inputs import _number, _single
 from rthstrack.evaluation.response import frequency_response, frequency_slopes
 from rthstrack.evaluation.settings import Settings
 from rthstrack.evaluation.tracking import Evaluator, bridged, evaluate_moving
-from rthstrack.said import failed
+from rthstrack.said import coded, failed
+from rthstrack.values import Shown, Value
 from rthstrack.verdict.argument import argument as argued
 from rthstrack.verdict.difference import differ
 from rthstrack.verdict.display import signal_roles
@@ -45,8 +46,8 @@ MOVING_S = 4.0
 READINGS_PER_WINDOW = 16
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Assessment:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Assessment(Value):
     """One pair, judged.
 
     `part` is "whole" (target to measured), "compensator" (target to command) or "actuator" (command to measured).
@@ -67,8 +68,8 @@ class Assessment:
     unit: str | None
     rate_hz: float
     start_s: float
-    target: NDArray[np.float64] = field(repr=False)
-    measured: NDArray[np.float64] = field(repr=False)
+    target: NDArray[np.float64]
+    measured: NDArray[np.float64]
     tracking: Tracking  # evaluated with weights=True: spectra and weights inside
     moving: MovingTracking | None
     moving_note: Said | None  # why there is no moving evaluation, when there is none
@@ -90,6 +91,17 @@ class Assessment:
     limits: Limits
     exceeded: tuple[Said, ...]
     factors: Factors | None = None  # P and Q with their bound, where the program chose them
+
+    def _shown(self) -> Shown:
+        rows = [
+            *([("file", self.file)] if self.file else []),
+            ("pair", f"{self.target_name}, {self.measured_name}: {self.target.size} samples at {self.rate_hz:g} Hz"),
+        ]
+        for t in [self.tracking] if self.trusted is self.tracking else [self.tracking, self.trusted]:
+            rows += [(f"{label}, {t.settings.estimator}", text) for label, text in t._number_rows()[:2]]
+        rows += [("", self.argument), *(("exceeded", text) for text in self.exceeded)]
+        rows += [("warnings", ", ".join(one.code for one in map(coded, self.warnings)))] if self.warnings else []
+        return Shown(f"Assessment: {self.verdict}", rows)
 
 
 def assess(
