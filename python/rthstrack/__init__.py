@@ -70,8 +70,8 @@ if TYPE_CHECKING:
     from rthstrack.studies.cells import Study as Study
     from rthstrack.studies.grid import study as study
     from rthstrack.verdict.assessment import Assessment as Assessment
-    from rthstrack.verdict.assessment import assess as assess
     from rthstrack.verdict.limits import Limits as Limits
+    from rthstrack.verdict.recorded import assess as assess
     from rthstrack.virtual_test.configuration import read_configuration as read_configuration
     from rthstrack.virtual_test.parts import VirtualTest as VirtualTest
     from rthstrack.virtual_test.run import CriticalDelay as CriticalDelay
@@ -110,8 +110,9 @@ _HOMES = {
     "report.page": "write_report",
     "studies.cells": "Study",
     "studies.grid": "study",
-    "verdict.assessment": "Assessment assess",
+    "verdict.assessment": "Assessment",
     "verdict.limits": "Limits",
+    "verdict.recorded": "assess",
     "virtual_test.configuration": "read_configuration",
     "virtual_test.parts": "VirtualTest",
     "virtual_test.run": "CriticalDelay Run",

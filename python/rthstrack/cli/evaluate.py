@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import csv
-import dataclasses
 import json
 import math
 import os
@@ -16,19 +15,19 @@ from rthstrack.cli.arguments import add_method, add_signals, chosen, files_in, p
 from rthstrack.cli.commands import COMMANDS
 from rthstrack.cli.progress import counted
 from rthstrack.cli.setting_options import FACTORS, setting_options, settle, with_auto
-from rthstrack.errors import RecordingError, RthstrackError, SettingError, SignalError
+from rthstrack.errors import RecordingError, RthstrackError, SettingError
 from rthstrack.evaluation.factors import TOLERANCE
 from rthstrack.evaluation.results import NUMBERS, end_names, is_interval, json_ready
 from rthstrack.evaluation.tracking import Evaluator
 from rthstrack.recording.chosen import read_chosen, read_two
 from rthstrack.recording.readers import FORMAT_NAMES
 from rthstrack.recording.recording import Recording
-from rthstrack.said import Said, coded
 from rthstrack.verdict import display
-from rthstrack.verdict.assessment import Assessment, assess, trusted_settings, without_trusted
+from rthstrack.verdict.assessment import trusted_settings, without_trusted
 from rthstrack.verdict.display import with_interval
 from rthstrack.verdict.entry import OF_TRUSTED, result_entry
 from rthstrack.verdict.limits import Limits
+from rthstrack.verdict.recorded import assess_pair
 from rthstrack.verdict.sentence import reason
 
 if TYPE_CHECKING:
@@ -39,6 +38,7 @@ if TYPE_CHECKING:
 
     from rthstrack.evaluation.settings import Settings
     from rthstrack.evaluation.tracking import MovingTracking
+    from rthstrack.verdict.assessment import Assessment
 
 FAILED, EXCEEDED = 1, 3
 _FIGURES = (".png", ".pdf", ".svg")
@@ -151,61 +151,29 @@ def _assess(
     args: argparse.Namespace,
 ) -> Assessment:
     asked, answered = recording.channel(target), recording.channel(measured)
-    assert recording.rate_hz is not None
     origin = {
-        "rate_source": recording.rate_source,
         "start_s": args.start,
         "end_s": args.end,
         "scale": dict(args.scale),
         "fill": args.fill,
         "n_filled": {c.name: recording.n_filled.get(c.path, 0) for c in (asked, answered)} if args.fill else {},
         "resample_hz": args.resample,
-        "notes": list(recording.notes),
-        "channels": proposal or "named by the user",
     }
-    try:
-        assessment = assess(
-            asked.values,
-            answered.values,
-            recording.rate_hz,
-            settings=args.settings,
-            choose=args.choose,
-            tolerance=args.tolerance or TOLERANCE,
-            moving_s=args.moving,
-            hop_s=args.hop,
-            limits=Limits(args.limit_delay, args.limit_amplitude) if part == "whole" else None,
-            file=recording.file,
-            actuator=actuator,
-            part=part,
-            target_name=asked.name,
-            measured_name=answered.name,
-            unit=asked.unit,
-            measured_unit=answered.unit,
-            start_s=recording.start_s,
-            origin=origin,
-        )
-    except SignalError as error:
-        hint = " (--fill SAMPLES interpolates short gaps)" if error.code == "not_finite" and not args.fill else ""
-        channels = f"target '{asked.name}', measured '{answered.name}'"
-        raise error.reworded(f"{channels}: {error}{hint}").about(recording.file) from None
-    except SettingError as error:
-        raise error.about(recording.file) from None
-    said = list(assessment.warnings)
-    notes = [coded(note) for note in (recording.notes if part == "whole" else ())]
-    # What the number stands and falls with comes first.
-    said = [note for note in notes if note.code in _GUESSES] + said
-    if proposal is not None and part == "whole":
-        words = f"no channels were named: judged target '{asked.name}', measured '{answered.name}' ({proposal})"
-        said.insert(0, Said(words, "channels_proposed"))
-    said += [note for note in notes if note.code not in _GUESSES]
-    guessed = list(dict.fromkeys(note.cause for note in map(coded, recording.notes) if note.code in _GUESSES))
-    guessed += [f"but {warning.cause}" for warning in assessment.warnings if warning.code == "copy"]
-    verdict = ", ".join([assessment.verdict, *guessed])
-    return dataclasses.replace(assessment, warnings=tuple(said), verdict=verdict)
-
-
-#: Notes on what is only a guess, which the verdict says too.
-_GUESSES = ("time_unit_guessed", "clocks_assumed", "clocks_aligned")
+    return assess_pair(
+        recording,
+        target,
+        measured,
+        proposal,
+        settings=args.settings,
+        choose=args.choose,
+        tolerance=args.tolerance or TOLERANCE,
+        moving_s=args.moving,
+        hop_s=args.hop,
+        limits=Limits(args.limit_delay, args.limit_amplitude) if part == "whole" else None,
+        actuator=actuator,
+        part=part,
+        origin=origin,
+    )
 
 
 def _two_files(args: argparse.Namespace, misuse: Callable[[str], Any]) -> list[tuple[str, str]] | None:

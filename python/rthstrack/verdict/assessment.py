@@ -104,7 +104,7 @@ class Assessment(Value):
         return Shown(f"Assessment: {self.verdict}", rows)
 
 
-def assess(
+def assess_samples(
     target: ArrayLike,
     measured: ArrayLike,
     rate_hz: float,
@@ -125,18 +125,7 @@ def assess(
     start_s: float = 0.0,
     origin: Mapping[str, Any] | None = None,
 ) -> Assessment:
-    """Judges one pair in every way there is: whole record, moving windows, over frequency, indices, warnings.
-
-    target, measured: (n_samples,) in `unit` (and `measured_unit`, the same unless given); settings: of `evaluate`;
-    their expected_delay_s is the trusted estimate's too, and its alone where the estimator is "fei".
-    choose: "P", "Q" or both are chosen within `tolerance` (`choose_factors`), in place of those in settings. They fit
-    the whole record only: moving windows have 1 in their place.
-    moving_s, hop_s: moving windows; by default 4 s but at most a quarter of the record, sixteen readings a window.
-    limits: apply to |delay| and |amplitude - 1|. `origin` says what was done to the samples before.
-
-    Raises SignalError, SettingError; where only the moving evaluation or the frequency response is impossible, it is
-    None and its note says why, unless `moving_s` or `hop_s` asked for it.
-    """
+    """Judges one pair of arrays (n_samples,) as `assess` of `recorded` describes."""
     asked_for = settings or Settings()
     settings = without_trusted(asked_for)
     t, m = _single(target, measured)
