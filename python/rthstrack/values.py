@@ -119,7 +119,7 @@ def _text(value: Any) -> str:
     if isinstance(value, float | np.floating):
         return f"{value:.6g}"
     if isinstance(value, np.ndarray):
-        return value_range(value)
+        return extent(value)
     if isinstance(value, tuple) and len(value) == 2 and all(isinstance(end, float) for end in value):
         return f"{value[0]:.6g} to {value[1]:.6g}"
     if is_dataclass(value) and not isinstance(value, type):
@@ -131,7 +131,7 @@ def _text(value: Any) -> str:
     return str(value)
 
 
-def value_range(values: np.ndarray[Any, Any], factor: float = 1.0, unit: str = "") -> str:
+def extent(values: np.ndarray[Any, Any], factor: float = 1.0, unit: str = "") -> str:
     """The least and the greatest of many: "6.33 to 12.11 ms"."""
     known = values[np.isfinite(values)] if values.dtype.kind in "fiu" else values
     if not known.size:

@@ -19,7 +19,7 @@ from rthstrack.evaluation.inputs import _count, _number, _samples, _single, merg
 from rthstrack.evaluation.results import _Result
 from rthstrack.evaluation.settings import Settings
 from rthstrack.evaluation.tracking import _SPECTRA, Tracking, _plan, _tracked
-from rthstrack.values import Shown, value_range
+from rthstrack.values import Shown, extent
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -297,7 +297,7 @@ class KeyFrequencies(_Result):
 
     def _shown(self) -> Shown:
         n = self.frequency_hz.size
-        rows = [("frequency", value_range(self.frequency_hz, 1.0, "Hz"))]
+        rows = [("frequency", extent(self.frequency_hz, 1.0, "Hz"))]
         return Shown(f"KeyFrequencies: {n}, which hold {100 * self.share_held:.5g} % of the weight", rows)
 
     def _columns(self) -> dict[str, Any]:

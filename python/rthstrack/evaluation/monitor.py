@@ -14,7 +14,7 @@ from rthstrack.errors import SettingError, SignalError
 from rthstrack.evaluation.inputs import _count, _samples, merged
 from rthstrack.evaluation.results import _made, _Numbers
 from rthstrack.evaluation.settings import MonitorSettings
-from rthstrack.values import Shown, value_range
+from rthstrack.values import Shown, extent
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -47,7 +47,7 @@ class Readings(_Numbers["NDArray[np.float64]", "NDArray[np.float64]"]):
 
     def _shown(self) -> Shown:
         heading = f"Readings, {self.settings.estimator}: {len(self)}, {np.count_nonzero(self.valid)} judged"
-        return Shown(heading, [*self._number_rows(), ("time", value_range(self.time_s, 1.0, "s"))])
+        return Shown(heading, [*self._number_rows(), ("time", extent(self.time_s, 1.0, "s"))])
 
     def _columns(self) -> dict[str, Any]:
         columns: dict[str, Any] = {name: getattr(self, name) for name in ("index", "time_s", "centre_s", "actuator")}

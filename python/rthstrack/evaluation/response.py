@@ -10,7 +10,7 @@ from rthstrack._core import frequency_response as core_frequency_response
 from rthstrack._core import frequency_slopes as core_frequency_slopes
 from rthstrack.evaluation.inputs import _band, _number, _single
 from rthstrack.evaluation.results import _Result
-from rthstrack.values import Shown, value_range, with_interval
+from rthstrack.values import Shown, extent, with_interval
 
 if TYPE_CHECKING:
     import numpy as np
@@ -53,10 +53,10 @@ class FrequencyResponse(_Result):
     def _shown(self) -> Shown:
         of = f"{self.frequency_hz.size} frequencies, {self.n_segments} segments of {self.segment_s:g} s"
         rows = [
-            ("frequency", value_range(self.frequency_hz, 1.0, "Hz")),
-            ("gain", value_range(self.gain)),
-            ("delay", value_range(self.delay_s, 1e3, "ms")),
-            ("coherence", value_range(self.coherence)),
+            ("frequency", extent(self.frequency_hz, 1.0, "Hz")),
+            ("gain", extent(self.gain)),
+            ("delay", extent(self.delay_s, 1e3, "ms")),
+            ("coherence", extent(self.coherence)),
         ]
         return Shown(f"FrequencyResponse: {of}", rows)
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 import numpy as np
 
-from rthstrack.values import Value, frame, read_only, value_range, with_interval
+from rthstrack.values import Value, extent, frame, read_only, with_interval
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -84,7 +84,7 @@ class _Numbers(_Result, Generic[_N, _I]):
         for label, name, interval, factor, unit in _FIRST:
             values = np.asarray(getattr(self, name) if at is None else getattr(self, name)[at])
             if values.ndim:
-                rows.append((label, value_range(values, factor, unit)))
+                rows.append((label, extent(values, factor, unit)))
                 continue
             ends: Any = getattr(self, interval) if interval else (math.nan, math.nan)
             low, high = ends if at is None or not interval else ends[at]

@@ -23,7 +23,7 @@ from rthstrack.evaluation.bad_samples import _bad_samples, bad_words
 from rthstrack.evaluation.inputs import _count, _number, _pair, merged, of_each
 from rthstrack.evaluation.results import NUMBERS, _made, _Numbers
 from rthstrack.evaluation.settings import MovingSettings, Settings
-from rthstrack.values import Shown, value_range
+from rthstrack.values import Shown, extent
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -122,7 +122,7 @@ class MovingTracking(_Numbers["NDArray[np.float64]", "NDArray[np.float64]"]):
         of = f" of {self.amplitude.shape[1]} actuators" if self.amplitude.ndim > 1 else ""
         n, known = self.valid.size, np.count_nonzero(self.valid)
         windows = f"{n} windows of {self.window_s:g} s, one every {self.hop_s:g} s, {known} judged"
-        span = value_range(self.time_s, 1.0, "s")
+        span = extent(self.time_s, 1.0, "s")
         return Shown(
             f"MovingTracking{of}, {self.settings.estimator}: {windows}", [*self._number_rows(), ("centres", span)]
         )

@@ -14,7 +14,7 @@ import numpy as np
 from rthstrack.errors import ChannelError, RecordingError, SettingError
 from rthstrack.said import Said
 from rthstrack.units import stem_and_unit, units_from_names
-from rthstrack.values import Shown, Value, frame, needed, value_range
+from rthstrack.values import Shown, Value, extent, frame, needed
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -64,7 +64,7 @@ class Channel(Value):
 
     def _shown(self) -> Shown:
         rows = [("path", self.path)] if self.path != self.name else []
-        rows.append(("values", value_range(self.values, 1.0, self.unit or "")))
+        rows.append(("values", extent(self.values, 1.0, self.unit or "")))
         if self.time is not None:
             rows.append(("time", self.time.source))
         return Shown(f"Channel '{self.name}': {len(self)} samples", rows)
