@@ -49,6 +49,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "evaluate",
         help=COMMANDS["evaluate"],
+        usage="rthstrack evaluate FILE ... [options]",
         description="Judges how well the measured displacement followed the target, in amplitude and in time "
         "(Guo, Xu and Chen 2014). A positive delay means that measured lags. "
         "Exit status: 0 everything was evaluated, 1 some file failed, 2 misuse, 3 a limit was exceeded.",
@@ -334,10 +335,9 @@ def _write_csv(path: Path, rows: Sequence[dict[str, Any]]) -> None:
 
 
 def _print_text(results: Sequence[Sequence[Assessment]], n_files: int) -> None:
-    from rich.console import Console
+    from rthstrack.cli.output import Console
 
-    # Into a file or pipe nothing is folded at a terminal's width.
-    console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 200)
+    console = Console()
     if n_files == 1:
         for a in (a for found in results for a in found):
             _print_one(console, a)
