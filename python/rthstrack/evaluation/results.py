@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 
 _T = TypeVar("_T")
-_N = TypeVar("_N")
-_I = TypeVar("_I")
+_N = TypeVar("_N", covariant=True)
+_I = TypeVar("_I", covariant=True)
 
 
 class _Result(Value):

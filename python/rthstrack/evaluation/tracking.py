@@ -11,7 +11,7 @@ import math
 import threading
 from collections import OrderedDict
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar, Unpack
+from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar, Unpack, overload
 
 import numpy as np
 
@@ -36,8 +36,27 @@ if TYPE_CHECKING:
 _T = TypeVar("_T")
 
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from typing_extensions import (
+        TypeVar as _TypeVar,  # the checkers' own: a tracking is one pair's unless it says other
+    )
+
+    _Number = _TypeVar("_Number", covariant=True, default=float)
+    _Interval = _TypeVar("_Interval", covariant=True, default=tuple[float, float])
+    _Fei = _TypeVar("_Fei", covariant=True, default=complex)
+    _Bad = _TypeVar("_Bad", covariant=True, default=tuple[BadSamples, ...])
+    _Words = _TypeVar("_Words", covariant=True, default=str)
+    _Values = _TypeVar("_Values", covariant=True, default=tuple[float, ...])
+else:
+    _Number, _Interval, _Fei, _Bad, _Words, _Values = map(
+        TypeVar, ("_Number", "_Interval", "_Fei", "_Bad", "_Words", "_Values")
+    )
+
+
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Tracking(_Numbers["float | NDArray[np.float64]", "tuple[float, float] | NDArray[np.float64]"]):
+class Tracking(_Numbers[_Number, _Interval], Generic[_Number, _Interval, _Fei, _Bad, _Words, _Values]):
     """Amplitude and delay of measured over target for one record (Eqs 6-12, or by alignment).
 
     Scalars for one pair, arrays of shape (n_actuators,) for several; intervals are (low, high), or (n_actuators, 2).
@@ -52,30 +71,31 @@ class Tracking(_Numbers["float | NDArray[np.float64]", "tuple[float, float] | ND
     (sum to one), `target_spectrum` and `measured_spectrum` (complex DFT of the windowed, zero-padded signals).
     """
 
-    fei: complex | NDArray[np.complex128]
+    fei: _Fei
     n_bins: int
     delta_f_hz: float
     rate_hz: float
     n_samples: int
     settings: Settings
-    bad_samples: tuple[BadSamples, ...] | tuple[tuple[BadSamples, ...], ...] = ()
-    reason: str | tuple[str, ...] = ""
-    reason_code: str | tuple[str, ...] = ""
-    reason_values: tuple[float, ...] | tuple[tuple[float, ...], ...] = ()
+    bad_samples: _Bad
+    reason: _Words
+    reason_code: _Words
+    reason_values: _Values
     frequency_hz: NDArray[np.float64] | None = None
     weights: NDArray[np.float64] | None = None
     target_spectrum: NDArray[np.complex128] | None = None
     measured_spectrum: NDArray[np.complex128] | None = None
 
     def _shown(self) -> Shown:
+        reason: Any = self.reason
         each: list[tuple[str, str]] = []
-        if not isinstance(self.reason, str):
-            n = len(self.reason)
+        if not isinstance(reason, str):
+            n = len(reason)
             told = (", ".join(f"{label} {text}" for label, text in self._number_rows(i)) for i in range(n))
             each = [(f"actuator {i}", text) for i, text in enumerate(told, start=1)]
         of = f" of {len(each)} actuators" if each else ""
         heading = f"Tracking{of}, {self.settings.estimator}: {self.n_samples} samples at {self.rate_hz:g} Hz"
-        why = dict.fromkeys([self.reason] if isinstance(self.reason, str) else self.reason)
+        why = dict.fromkeys([reason] if isinstance(reason, str) else reason)
         return Shown(heading, [*(each or self._number_rows()), *(("", text) for text in why if text)])
 
     def _columns(self) -> dict[str, Any]:
@@ -91,10 +111,20 @@ class Tracking(_Numbers["float | NDArray[np.float64]", "tuple[float, float] | ND
         return (
             {"actuator": np.arange(n)}
             | self._number_columns()
-            | {"fei": np.atleast_1d(self.fei)}
+            | {"fei": np.atleast_1d(np.asarray(self.fei))}
             | {name: list(values) for name, values in each.items()}
             | {name: [value] * n for name, value in same.items()}
         )
+
+
+#: Of several actuators.
+Trackings: TypeAlias = (
+    "Tracking[NDArray[np.float64], NDArray[np.float64], NDArray[np.complex128], tuple[tuple[BadSamples, ...], ...], "
+    "tuple[str, ...], tuple[tuple[float, ...], ...]]"
+)
+#: One pair, as far as types tell, and several.
+One: TypeAlias = "np.ndarray[tuple[int], np.dtype[Any]] | Sequence[float]"
+Several: TypeAlias = "np.ndarray[tuple[int, int], np.dtype[Any]] | Sequence[Sequence[float]]"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -192,12 +222,59 @@ class Evaluator:
         """Spacing of the kept bins, Q rate / n (Eq 9), in hertz."""
         return self._plan.delta_f_hz
 
-    def evaluate(self, target: ArrayLike, measured: ArrayLike, *, weights: bool = False) -> Tracking:
+    @overload
+    def evaluate(self, target: One, measured: One, *, weights: bool = False) -> Tracking: ...
+
+    @overload
+    def evaluate(  # type: ignore[overload-overlap]
+        self, target: Several, measured: Several, *, weights: bool = False
+    ) -> Trackings: ...
+
+    @overload
+    def evaluate(self, target: ArrayLike, measured: ArrayLike, *, weights: bool = False) -> Tracking: ...
+
+    def evaluate(self, target: ArrayLike, measured: ArrayLike, *, weights: bool = False) -> Any:
         """As the function `evaluate`, for signals of this length and rate."""
         t, m = _pair(target, measured)
         if len(t) != self.n_samples:
             raise SignalError(f"this evaluator is planned for {self.n_samples} samples, not for {len(t)}")
         return _tracking(self._plan, self.settings, self.rate_hz, t, m, weights)
+
+
+@overload
+def evaluate(
+    target: One,
+    measured: One,
+    rate_hz: float,
+    settings: Settings | None = None,
+    *,
+    weights: bool = False,
+    **changes: Unpack[EvaluationKeywords],
+) -> Tracking: ...
+
+
+@overload
+def evaluate(  # type: ignore[overload-overlap]
+    target: Several,
+    measured: Several,
+    rate_hz: float,
+    settings: Settings | None = None,
+    *,
+    weights: bool = False,
+    **changes: Unpack[EvaluationKeywords],
+) -> Trackings: ...
+
+
+@overload
+def evaluate(
+    target: ArrayLike,
+    measured: ArrayLike,
+    rate_hz: float,
+    settings: Settings | None = None,
+    *,
+    weights: bool = False,
+    **changes: Unpack[EvaluationKeywords],
+) -> Tracking: ...
 
 
 def evaluate(
@@ -208,7 +285,7 @@ def evaluate(
     *,
     weights: bool = False,
     **changes: Unpack[EvaluationKeywords],
-) -> Tracking:
+) -> Any:
     """Amplitude and delay of measured over target for whole records (Guo, Xu and Chen 2014, Eqs 1-12; or by alignment).
 
     FEI = sum O_k conj(I_k) |I_k|^(l-2) / sum |I_k|^l,  f_eq = sum f_k |I_k|^l / sum |I_k|^l,
