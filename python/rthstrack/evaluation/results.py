@@ -99,16 +99,17 @@ _FIRST = (
 )
 
 
-def _made(kind: type[_T], *parts: Mapping[str, Any]) -> _T:
+def _made(kind: type[_T], *parts: Mapping[str, Any], scalars: bool = False) -> _T:
     """A frozen dataclass without slots from all of its fields.
 
-    Its own constructor sets them one by one: a fifth of the time in which a short record is evaluated.
+    Its own constructor sets them one by one: a fifth of the time in which a short record is evaluated. scalars: no field
+    is an array.
     """
     made = object.__new__(kind)
     fields = made.__dict__
     for part in parts:
         fields.update(part)
-    for name, value in fields.items():
+    for name, value in () if scalars else fields.items():
         if type(value) is np.ndarray:
             fields[name] = read_only(value)
     return made

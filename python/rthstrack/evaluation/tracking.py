@@ -54,6 +54,10 @@ else:
         TypeVar, ("_Number", "_Interval", "_Fei", "_Bad", "_Words", "_Values")
     )
 
+# Of one pair; as defaults of any type.
+_NOTHING: Any = ()
+_NO_WORDS: Any = ""
+
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Tracking(_Numbers[_Number, _Interval], Generic[_Number, _Interval, _Fei, _Bad, _Words, _Values]):
@@ -77,10 +81,10 @@ class Tracking(_Numbers[_Number, _Interval], Generic[_Number, _Interval, _Fei, _
     rate_hz: float
     n_samples: int
     settings: Settings
-    bad_samples: _Bad
-    reason: _Words
-    reason_code: _Words
-    reason_values: _Values
+    bad_samples: _Bad = _NOTHING
+    reason: _Words = _NO_WORDS
+    reason_code: _Words = _NO_WORDS
+    reason_values: _Values = _NOTHING
     frequency_hz: NDArray[np.float64] | None = None
     weights: NDArray[np.float64] | None = None
     target_spectrum: NDArray[np.complex128] | None = None
@@ -368,7 +372,7 @@ def _tracked(found: Sequence[Any], ndim: int, **about: Any) -> Tracking:
         fields = {name: tuple(one[name] for one in found) for name in _REASON}
         fields["fei"] = np.array([one["fei"] for one in found])
         fields["bad_samples"] = tuple(_bad_samples(one["bad_samples"], about["rate_hz"]) for one in found)
-    return _made(Tracking, numbers, fields, about)
+    return _made(Tracking, numbers, fields, about, scalars=ndim == 1 and about["weights"] is None)
 
 
 def _each_actuator(

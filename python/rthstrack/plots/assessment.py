@@ -214,6 +214,8 @@ def plot_frequency_response(
         shown = display.judged_range(result.tracking) if isinstance(result, Assessment) else None
         low, high = shown or (float(frequency[0]), float(frequency[-1]))
         low = max(low, float(frequency[0]))
+        if not run.first:
+            low, high = min(low, gain_axis.get_xlim()[0]), max(high, gain_axis.get_xlim()[1])
         in_view = (frequency >= low) & (frequency <= high)
         for axis, its, values, interval, ideal, least in (
             (gain_axis, runs[0], response.gain[above_zero], response.gain_interval[above_zero], 1.0, 0.02),
