@@ -102,8 +102,8 @@ _FIRST = (
 def _made(kind: type[_T], *parts: Mapping[str, Any], scalars: bool = False) -> _T:
     """A frozen dataclass without slots from all of its fields.
 
-    Its own constructor sets them one by one: a fifth of the time in which a short record is evaluated. scalars: no field
-    is an array.
+    Its own constructor sets them one by one: a fifth of the time in which a short record is evaluated. scalars: no
+    field is an array.
     """
     made = object.__new__(kind)
     fields = made.__dict__
