@@ -149,6 +149,10 @@ settings: .venv/built ## writes Python's settings and docs/settings.md anew from
 	@$(BIN)/python reference/make_settings.py
 	@$(BIN)/ruff format --quiet python/rthstrack/evaluation/settings.py
 
+.PHONY: shown
+shown: .venv/built ## writes anew what the Python of README and docs is shown to print
+	@$(BIN)/python tests/documents.py
+
 .PHONY: golden
 golden: .venv/ready ## writes tests/golden anew from the NumPy twin
 	@$(BIN)/python reference/make_golden.py

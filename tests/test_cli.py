@@ -240,7 +240,7 @@ def test_misuse_is_told_with_status_2(capsys: pytest.CaptureFixture[str], record
     status, out, err = run(capsys, recorded, *options)
     assert status == 2
     assert out == ""
-    assert "error: " in err.splitlines()[-1]
+    assert "error: " in err.splitlines()[0]
 
 
 @pytest.mark.parametrize(

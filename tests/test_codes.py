@@ -13,7 +13,7 @@ import pytest
 import rthstrack
 from rthstrack.cli import main
 from rthstrack.said import Said
-from rthstrack.verdict.assessment import assess
+from rthstrack.verdict import assess
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -398,7 +398,7 @@ def test_bad_values_are_misuse(
 ) -> None:
     status, out, err = run(capsys, recorded, *arguments)
     assert (status, out) == (2, "")
-    assert words in err.splitlines()[-1]
+    assert words in err.splitlines()[0]
 
 
 # --- study ----------------------------------------------------------------------------------------------------------
@@ -501,4 +501,4 @@ def test_the_study_command_refuses_nonsense(
 ) -> None:
     status, out, err = run(capsys, recorded, *arguments, command="study")
     assert (status, out) == (2, "")
-    assert words in err.splitlines()[-1]
+    assert words in err.splitlines()[0]

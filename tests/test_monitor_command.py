@@ -39,14 +39,15 @@ def fake(monkeypatch: pytest.MonkeyPatch) -> type[FakeLive]:
 
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, list[str]]:
-    """Exit status, standard output and the lines of standard error."""
+    """Exit status, standard output and the lines of standard error, without the usage that follows a misuse."""
     try:
         status = main(["monitor", *map(str, arguments)])
     except SystemExit as stop:
         status = int(stop.code or 0)
     out, err = capsys.readouterr()
     assert "Traceback" not in err
-    return status, out, err.splitlines()
+    lines = err.splitlines()
+    return status, out, lines[:-2] if lines[-2:-1] and lines[-2].startswith("usage: ") else lines
 
 
 # Mistakes -------------------------------------------------------------------------------------------------------------

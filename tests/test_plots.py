@@ -220,3 +220,97 @@ def test_matplotlibs_own_settings_are_left_as_they_were_by_threads_too(tmp_path:
 def test_neither_pyplot_nor_a_display_is_needed() -> None:
     code = "import sys, rthstrack.plots; sys.exit('matplotlib.pyplot' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+# Two runs on one axes -------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def two_runs() -> tuple[Assessment, Assessment]:
+    """One late and too large; one of another target, longer, larger and later."""
+    target, measured = examples.synthetic(14_000, delay_s=0.07, gain=1.2)
+    first = examples.judged(*examples.synthetic(), 200.0, limits=Limits(delay_s=0.05))
+    return first, examples.judged(1.5 * target, 1.5 * measured, 200.0, limits=Limits(delay_s=0.05))
+
+
+def drawn(plot: Callable[..., Any], n: int, *runs: tuple[Assessment, dict[str, Any]]) -> list[Axes]:
+    axes = list(np.atleast_1d(np.asarray(Figure(layout="constrained").subplots(n, 1), dtype=object)))
+    for run, how in runs:
+        plot(run, ax=axes[0] if n == 1 else axes, **how)
+    return axes
+
+
+def legend_of(ax: Axes) -> dict[str, str]:
+    """Each entry with its colour."""
+    legend = ax.get_legend()
+    assert legend is not None
+    colours = [to_hex(handle.get_color()) for handle in legend.get_lines()]
+    return dict(zip([text.get_text() for text in legend.get_texts()], colours, strict=True))
+
+
+ALL = (*((plot, 1) for plot in ONE), *SEVERAL)
+
+
+@pytest.mark.parametrize(("plot", "n"), ALL)
+def test_two_runs_have_their_colours_and_names_and_stay_in_view(
+    plot: Callable[..., Any], n: int, two_runs: tuple[Assessment, Assessment]
+) -> None:
+    one, other = two_runs
+    axes = drawn(plot, n, (one, {"label": "before", "color": "#123456"}), (other, {"label": "after"}))
+    entries = legend_of(axes[0])
+    ours = {name: colour for name, colour in entries.items() if name.startswith(("before", "after"))}
+    colours = [{colour for name, colour in ours.items() if name.startswith(run)} for run in ("before", "after")]
+    # The first run's target is black, wherever there is one.
+    assert colours[0] - {plots.TARGET} == {"#123456"}
+    assert len(colours[1]) == 1
+    assert not colours[0] & colours[1]
+    # What either run shows alone is in view, and a single run looks as it does alone.
+    for i, ax in enumerate(axes):
+        (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
+        for run in two_runs:
+            alone = drawn(plot, n, (run, {}))[i]
+            assert x0 <= alone.get_xlim()[0] + 1e-9
+            assert x1 >= alone.get_xlim()[1] - 1e-9
+            for line in alone.lines if plot is not plots.plot_frequency_response else ():
+                shown = np.asarray(line.get_ydata(), dtype=float)
+                if plot is plots.plot_moving and to_hex(line.get_color()) == plots.THIRD:
+                    continue  # of a named run the trusted estimate alone
+                if plot is plots.plot_spectra:
+                    shown = shown[shown > shown.max() / 100]
+                assert np.nanmin(shown) >= y0 - 1e-9 * abs(y0)
+                assert np.nanmax(shown) <= y1 + 1e-9 * abs(y1)
+
+
+@pytest.mark.parametrize(("plot", "n"), ALL)
+def test_a_second_run_without_a_name_is_run_2(
+    plot: Callable[..., Any], n: int, two_runs: tuple[Assessment, Assessment]
+) -> None:
+    alone = drawn(plot, n, (two_runs[0], {}))[0].get_legend()
+    if alone is not None:
+        assert not any("run" in text.get_text() for text in alone.get_texts())
+    entries = legend_of(drawn(plot, n, *((run, {}) for run in two_runs))[0])
+    assert any(name.startswith("run 1") for name in entries)
+    assert any(name.startswith("run 2") for name in entries)
+
+
+def test_a_target_in_common_is_drawn_once_and_has_no_runs_name(two_runs: tuple[Assessment, Assessment]) -> None:
+    one, _ = two_runs
+    same = examples.judged(one.target, 0.9 * one.measured, 200.0)
+    for plot in (plots.plot_time_history, plots.plot_spectra):
+        (ax,) = drawn(plot, 1, (one, {"label": "A"}), (same, {"label": "B"}))
+        assert list(legend_of(ax)) == ["target", "A: measured", "B: measured"]
+
+
+def test_axes_that_were_cleared_are_new(two_runs: tuple[Assessment, Assessment]) -> None:
+    one, other = two_runs
+    (ax,) = drawn(plots.plot_error, 1, (other, {}))
+    ax.clear()
+    plots.plot_error(one, ax=ax)
+    assert ax.get_xlim() == plots.plot_error(one).get_xlim()
+    assert legend_of(ax) == legend_of(plots.plot_error(one))
+
+
+def test_one_axes_has_one_unit(two_runs: tuple[Assessment, Assessment]) -> None:
+    one, other = two_runs
+    with pytest.raises(SettingError, match="two units: mm is drawn, in was given"):
+        drawn(plots.plot_error, 1, (one, {}), (dataclasses.replace(other, unit="in"), {}))

@@ -101,4 +101,4 @@ def test_an_unknown_preset_is_misuse(capsys: pytest.CaptureFixture[str], recorde
         main([command, str(recorded), "--preset", "papr"])
     assert stop.value.code == 2
     said = capsys.readouterr().err.replace("'", "")
-    assert "invalid choice: papr (choose from paper, paper-fast)" in said
+    assert "expected one of paper, paper-fast, found papr (did you mean paper or paper-fast?)" in said

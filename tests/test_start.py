@@ -46,6 +46,12 @@ def test_importing_the_package_loads_nothing_until_a_name_is_used() -> None:
     assert run.stdout.split() == ["False", "True"]
 
 
+def test_every_room_is_there_after_importing_the_package_alone() -> None:
+    code = "import rthstrack\nprint(*[getattr(rthstrack, room).__name__ for room in rthstrack._ROOMS])"
+    run = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert run.stdout.split() == [f"rthstrack.{room}" for room in rthstrack._ROOMS]
+
+
 def test_every_public_name_is_there_and_listed() -> None:
     assert set(rthstrack.__all__) <= set(dir(rthstrack))
     for name in rthstrack.__all__:
@@ -64,4 +70,6 @@ def test_type_checkers_see_the_names_that_there_are() -> None:
         for alias in node.names
         if alias.asname == alias.name
     }
-    assert seen == rthstrack._HOME
+    rooms = {name for name, module in seen.items() if module == "rthstrack"}
+    assert {name: module for name, module in seen.items() if name not in rooms} == rthstrack._HOME
+    assert rooms == set(rthstrack._ROOMS)

@@ -386,7 +386,7 @@ def test_settings_that_exclude_each_other_are_misuse(
     with pytest.raises(SystemExit) as stop:
         main(["evaluate", str(saved(tmp_path, burst(), burst(0.01))), *options])
     assert stop.value.code == 2
-    assert "error: " in capsys.readouterr().err.splitlines()[-1]
+    assert "error: " in capsys.readouterr().err.splitlines()[0]
 
 
 def test_options_of_the_estimators_reach_them(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

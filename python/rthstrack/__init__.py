@@ -10,6 +10,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rthstrack import configuration as configuration
+    from rthstrack import errors as errors
+    from rthstrack import evaluation as evaluation
+    from rthstrack import ground_motion as ground_motion
+    from rthstrack import plots as plots
+    from rthstrack import recording as recording
+    from rthstrack import report as report
+    from rthstrack import reproduction as reproduction
+    from rthstrack import studies as studies
+    from rthstrack import units as units
+    from rthstrack import verdict as verdict
+    from rthstrack import virtual_test as virtual_test
     from rthstrack._core import __version__ as __version__
     from rthstrack.errors import ChannelError as ChannelError
     from rthstrack.errors import ConfigurationError as ConfigurationError
@@ -58,8 +70,8 @@ if TYPE_CHECKING:
     from rthstrack.studies.cells import Study as Study
     from rthstrack.studies.grid import study as study
     from rthstrack.verdict.assessment import Assessment as Assessment
-    from rthstrack.verdict.assessment import assess as assess
     from rthstrack.verdict.limits import Limits as Limits
+    from rthstrack.verdict.recorded import assess as assess
     from rthstrack.virtual_test.configuration import read_configuration as read_configuration
     from rthstrack.virtual_test.parts import VirtualTest as VirtualTest
     from rthstrack.virtual_test.run import CriticalDelay as CriticalDelay
@@ -98,8 +110,9 @@ _HOMES = {
     "report.page": "write_report",
     "studies.cells": "Study",
     "studies.grid": "study",
-    "verdict.assessment": "Assessment assess",
+    "verdict.assessment": "Assessment",
     "verdict.limits": "Limits",
+    "verdict.recorded": "assess",
     "virtual_test.configuration": "read_configuration",
     "virtual_test.parts": "VirtualTest",
     "virtual_test.run": "CriticalDelay Run",

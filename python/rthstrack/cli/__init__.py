@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 from importlib import import_module
@@ -10,23 +9,39 @@ from typing import TYPE_CHECKING
 
 from rthstrack._core import __version__
 from rthstrack.cli.commands import COMMANDS
-from rthstrack.errors import RthstrackError, SettingError
+from rthstrack.cli.parser import MISUSE, Parser
+from rthstrack.errors import ConfigurationError, RthstrackError, SettingError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-MISUSE = 2
+INTERRUPTED, BROKEN_PIPE = 130, 141
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs the command line; returns the exit status: 0 done, 1 some file failed, 2 misuse, 3 a limit was exceeded."""
-    parser = argparse.ArgumentParser(
+    try:
+        try:
+            return _run(sys.argv[1:] if argv is None else argv)
+        finally:
+            if sys.stdout is not None:
+                sys.stdout.flush()
+    except BrokenPipeError:
+        # Whoever read the output has had enough; nothing more may be written, not even at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return BROKEN_PIPE
+    except KeyboardInterrupt:
+        print("rthstrack: interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+def _run(words: Sequence[str]) -> int:
+    parser = Parser(
         prog="rthstrack",
         description="Did the actuator do what the simulation asked? Gain and delay of actuator tracking.",
     )
     parser.add_argument("--version", action="version", version=f"rthstrack {__version__}")
     subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    words = sys.argv[1:] if argv is None else argv
     asked = next((word for word in words if not word.startswith("-")), None)
     for name, line in COMMANDS.items():
         if name == asked:
@@ -36,18 +51,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = parser.parse_args(words)
     try:
         status: int = args.run(args)
-        sys.stdout.flush()
-        return status
     except RthstrackError as error:
         from rthstrack.cli.arguments import told
 
         for line in told(error).splitlines():
             print(f"rthstrack: {line}", file=sys.stderr)
-        return MISUSE if isinstance(error, SettingError) else 1
-    except BrokenPipeError:
-        # Whoever read the output has had enough; nothing more may be written, not even at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
-    except KeyboardInterrupt:
-        print("rthstrack: interrupted", file=sys.stderr)
-        return 130
+        if not isinstance(error, SettingError):
+            return 1
+        # What a file says wrong is no matter of how the command is used.
+        if asked is not None and not isinstance(error, ConfigurationError):
+            print(subparsers.choices[asked].hint(), file=sys.stderr)
+        return MISUSE
+    return status

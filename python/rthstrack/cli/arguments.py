@@ -89,6 +89,7 @@ OPTIONS = {
     "time": "--time CHANNEL",
     "resample_hz": "--resample HZ",
     "fill": "--fill SAMPLES",
+    "filled(SAMPLES)": "--fill SAMPLES",
     "unit": "--unit",
     "align": "--align",
     "start_s": "--start S",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import json
 import os
 import sys
@@ -17,23 +16,24 @@ from rthstrack.cli.evaluate_text import SORTED_BY, print_text
 from rthstrack.cli.progress import counted
 from rthstrack.cli.quantities import positive, seconds
 from rthstrack.cli.setting_options import FACTORS, setting_options, settle, with_auto
-from rthstrack.errors import RecordingError, RthstrackError, SettingError, SignalError
+from rthstrack.errors import RecordingError, RthstrackError, SettingError
 from rthstrack.evaluation.factors import TOLERANCE
 from rthstrack.evaluation.results import json_ready
 from rthstrack.evaluation.tracking import Evaluator
 from rthstrack.recording.chosen import read_chosen, read_two
 from rthstrack.recording.readers import FORMAT_NAMES
 from rthstrack.recording.recording import Recording
-from rthstrack.said import Said, coded
-from rthstrack.verdict.assessment import Assessment, assess, trusted_settings, without_trusted
+from rthstrack.verdict.assessment import trusted_settings, without_trusted
 from rthstrack.verdict.entry import result_entry
 from rthstrack.verdict.limits import EXCEEDED as LIMIT_EXCEEDED
 from rthstrack.verdict.limits import NOT_JUDGED, Limits
+from rthstrack.verdict.recorded import assess_pair
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from rthstrack.evaluation.settings import Settings
+    from rthstrack.verdict.assessment import Assessment
 
 FAILED, EXCEEDED = 1, 3
 _FIGURES = (".png", ".pdf", ".svg")
@@ -44,6 +44,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "evaluate",
         help=COMMANDS["evaluate"],
+        usage="rthstrack evaluate FILE ... [options]",
         description="Judges how well the measured displacement followed the target, in amplitude and in time "
         "(Guo, Xu and Chen 2014). A positive delay means that measured lags. "
         "Exit status: 0 everything was evaluated and is within the limits, 1 some file failed, 2 misuse, 3 a limit was "
@@ -157,66 +158,34 @@ def _assess(
     args: argparse.Namespace,
 ) -> Assessment:
     asked, answered = recording.channel(target), recording.channel(measured)
-    assert recording.rate_hz is not None
     origin = {
-        "rate_source": recording.rate_source,
         "start_s": args.start,
         "end_s": args.end,
         "scale": dict(args.scale),
         "fill": args.fill,
         "n_filled": {c.name: recording.n_filled.get(c.path, 0) for c in (asked, answered)} if args.fill else {},
         "resample_hz": args.resample,
-        "notes": list(recording.notes),
-        "channels": proposal or "named by the user",
     }
-    try:
-        assessment = assess(
-            asked.values,
-            answered.values,
-            recording.rate_hz,
-            settings=args.settings,
-            choose=args.choose,
-            tolerance=args.tolerance or TOLERANCE,
-            moving_s=args.moving,
-            hop_s=args.hop,
-            limits=_limits(args) if part == "whole" else None,
-            structure=args.test if part == "whole" else None,
-            file=recording.file,
-            actuator=actuator,
-            part=part,
-            target_name=asked.name,
-            measured_name=answered.name,
-            unit=asked.unit,
-            measured_unit=answered.unit,
-            start_s=recording.start_s,
-            origin=origin,
-        )
-    except SignalError as error:
-        hint = " (--fill SAMPLES interpolates short gaps)" if error.code == "not_finite" and not args.fill else ""
-        channels = f"target '{asked.name}', measured '{answered.name}'"
-        raise error.reworded(f"{channels}: {error}{hint}").about(recording.file) from None
-    except SettingError as error:
-        raise error.about(recording.file) from None
-    said = list(assessment.warnings)
-    notes = [coded(note) for note in (recording.notes if part == "whole" else ())]
-    # What the number stands and falls with comes first.
-    said = [note for note in notes if note.code in _GUESSES] + said
-    if proposal is not None and part == "whole":
-        words = f"no channels were named: judged target '{asked.name}', measured '{answered.name}' ({proposal})"
-        said.insert(0, Said(words, "channels_proposed"))
-    said += [note for note in notes if note.code not in _GUESSES]
-    guessed = list(dict.fromkeys(note.cause for note in map(coded, recording.notes) if note.code in _GUESSES))
-    guessed += [f"but {warning.cause}" for warning in assessment.warnings if warning.code == "copy"]
-    verdict = ", ".join([assessment.verdict, *guessed])
-    return dataclasses.replace(assessment, warnings=tuple(said), verdict=verdict)
+    return assess_pair(
+        recording,
+        target,
+        measured,
+        proposal,
+        settings=args.settings,
+        choose=args.choose,
+        tolerance=args.tolerance or TOLERANCE,
+        moving_s=args.moving,
+        hop_s=args.hop,
+        limits=_limits(args) if part == "whole" else None,
+        structure=args.test if part == "whole" else None,
+        actuator=actuator,
+        part=part,
+        origin=origin,
+    )
 
 
 def _limits(args: argparse.Namespace) -> Limits:
     return Limits(args.limit_delay, args.limit_amplitude, args.critical_delay, args.critical_fraction or 1.0)
-
-
-#: Notes on what is only a guess, which the verdict says too.
-_GUESSES = ("time_unit_guessed", "clocks_assumed", "clocks_aligned")
 
 
 def _two_files(args: argparse.Namespace, misuse: Callable[[str], Any]) -> list[tuple[str, str]] | None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import sys
 from typing import TYPE_CHECKING
 
 from rthstrack.cli.evaluate_many import print_many
@@ -27,25 +26,21 @@ SORTED_BY = ("worst", "given", "file", "delay", "amplitude", "error")
 
 _PARTS = {"whole": "", "compensator": "compensator: ", "actuator": "actuator: "}
 _COLOURS = {"passed": "bold green", "exceeded": "bold red", "not_judged": "bold yellow"}
-# Into a file or pipe a table may be this wide.
-_PIPE_WIDTH = 200
 
 
 def print_text(results: Sequence[Sequence[Assessment]], n_files: int, sort: str) -> None:
     """Prints one file's results in full, many files' in a table."""
-    from rich.console import Console
+    from rthstrack.cli.output import Console
 
-    # Into a file or pipe nothing is folded at a terminal's width.
-    is_terminal = sys.stdout.isatty()
-    width = None if is_terminal or "COLUMNS" in os.environ else _PIPE_WIDTH
-    console = Console(highlight=False, soft_wrap=not is_terminal, width=width)
+    console = Console()
     found = [a for one in results for a in one]
     if n_files == 1:
         several = len({a.actuator for a in found}) > 1
         for a in found:
             _print_one(console, a, several=several)
     elif found:
-        print_many(console, found, sort)
+        # A table is as wide as it is told to be, in a pipe too.
+        print_many(Console(width=None) if "COLUMNS" in os.environ else console, found, sort)
 
 
 def called(a: Assessment) -> str:

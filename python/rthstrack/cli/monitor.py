@@ -54,9 +54,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "monitor",
         help=COMMANDS["monitor"],
+        usage="rthstrack monitor --listen udp://HOST:PORT|- --rate HZ [options]",
         description=_DESCRIPTION,
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     wrong: dict[str, str] = {}
     add_options(parser, wrong)

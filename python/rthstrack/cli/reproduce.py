@@ -27,7 +27,7 @@ the extra rthstrack[records]. Whoever has the paper's records gives them with --
 _EPILOG = """\
 examples:
   rthstrack reproduce -o paper
-  rthstrack reproduce -o paper --record MU2035=NORTHR_MU2035.AT2 --record CANOGA=CNP196.AT2
+  rthstrack reproduce -o paper --record MU2035=NORTHR_MU2035.AT2
 
 Files of the same names in DIR are overwritten, no others.
 Exit status: 0 done, 1 a record cannot be had or read, or a file not be written, 2 misuse.
@@ -41,7 +41,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help=COMMANDS["reproduce"],
         description=_DESCRIPTION,
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
         "-o", "--output", type=Path, required=True, metavar="DIR", help="folder to write; made if need be"

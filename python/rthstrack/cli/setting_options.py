@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from rthstrack._core import checked_settings, settings_table
+from rthstrack.cli.parser import meant
 from rthstrack.cli.quantities import number
 from rthstrack.errors import SettingError
 from rthstrack.evaluation.inputs import merged
@@ -108,7 +109,8 @@ def _reader(of: str, row: _SettingRow) -> Callable[[str], Any]:
         try:
             checked_settings(of, {row["name"]: (value, value) if row["kind"] == "band" else value})
         except SettingError:
-            raise argparse.ArgumentTypeError(f"expected {row['expected']}, found '{text}'") from None
+            near = meant(text, row["choices"])
+            raise argparse.ArgumentTypeError(f"expected {row['expected']}, found '{text}'{near}") from None
         return value
 
     return read

@@ -79,12 +79,12 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
 
 
 def _print(run: Run, config: str) -> None:
-    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
-    # Into a file or pipe nothing is folded at a terminal's width.
-    console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 200)
+    from rthstrack.cli.output import Console
+
+    console = Console()
     table = Table(box=None, show_header=False, pad_edge=False)
     table.add_column(style="dim", no_wrap=True)
     table.add_column(overflow="fold")

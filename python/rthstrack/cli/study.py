@@ -51,9 +51,9 @@ configurations bring the truth with them.
 _EPILOG = """\
 examples:
   rthstrack study run.h5 -o study
-  rthstrack study test.csv --target cmd --measured meas --true-delay 0.012 -o study
+  rthstrack study test.csv --true-delay 0.012 -o study
   rthstrack study run.h5 -P auto -Q auto --tolerance 0.005 --share 0.99,0.999
-  rthstrack study test.csv -P 1,4,16 -Q 1,2,4,8 --windows boxcar,tukey --weight-powers 1,2 --json
+  rthstrack study test.csv -P 1,4,16 -Q 1,2,4,8 --windows boxcar,tukey --json
 
 With -o DIR: study.csv (a row a cell with every setting in it; a cell that leaves nothing to judge
 by has empty numbers and a reason) and, of each source, the figures data_decimation,
@@ -73,7 +73,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help=COMMANDS["study"],
         description=_DESCRIPTION,
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("sources", nargs="+", metavar="SOURCE", help="recorded test, run file or configuration (.toml)")
     grid = parser.add_argument_group("grid (lists with commas)")
@@ -271,11 +270,11 @@ def _write(found: Study, args: argparse.Namespace) -> list[str]:
 
 
 def _print_text(found: Study) -> None:
-    from rich.console import Console
     from rich.text import Text
 
-    # Into a file or pipe nothing is folded at a terminal's width.
-    console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 200)
+    from rthstrack.cli.output import Console
+
+    console = Console()
     if len(found.sources) > 1:
         _print_summary(console, found)
         _print_beside(console, found)

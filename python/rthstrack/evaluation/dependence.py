@@ -81,7 +81,7 @@ _STRAIGHT, _ROUGH = 0.05, 0.12
 _NEAR = 0.5
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Level(_Result):
     """Gain and delay over a part of the motion, with 95 % intervals (NaN where nothing supports one).
 
@@ -96,7 +96,7 @@ class Level(_Result):
     gain_interval: Interval
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Line(_Result):
     """Delay or gain as a straight line over `band_hz`, from which the curve departs by `misfit` at most, ends included.
 
@@ -111,7 +111,7 @@ class Line(_Result):
     misfit: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Dependence(_Result):
     """What delay and gain depend on: `kind`, and the `share` of their variation that it explains, 0 to 1.
 

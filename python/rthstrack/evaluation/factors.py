@@ -6,7 +6,7 @@ Signs and units as in `evaluate`: delay_s > 0 means measured lags target. One pa
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 import numpy as np
@@ -19,6 +19,7 @@ from rthstrack.evaluation.inputs import PUBLISHED, _count, _number, _samples, _s
 from rthstrack.evaluation.results import _Result
 from rthstrack.evaluation.settings import Settings
 from rthstrack.evaluation.tracking import _SPECTRA, Tracking, _plan, _tracked
+from rthstrack.values import Shown, extent
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -31,7 +32,7 @@ TOLERANCE = 0.005
 SHARE = 0.999
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FactorChanges(_Result):
     """What pairs of factors change, or may change: arrays (n,), an entry a pair of P and Q.
 
@@ -59,7 +60,7 @@ def _changes_sentence(amplitude_bound: float, delay_bound: float, measure: str) 
     return f"A by at most {100 * amplitude_bound:.2g} % and {delay}"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class WindowedFactors(_Result):
     """P and Q that the same tolerance allows under another window, and their bounds, as in `Factors`.
 
@@ -89,7 +90,7 @@ class WindowedFactors(_Result):
         return {f.name: [getattr(self, f.name)] for f in dataclasses.fields(self)}
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Factors(_Result):
     """P and Q that were chosen, and how far A and d are from `reference` there at most.
 
@@ -106,7 +107,7 @@ class Factors(_Result):
     tolerance: float
     settings: Settings
     reference: Tracking
-    changes: FactorChanges = field(repr=False)
+    changes: FactorChanges
     windowed: WindowedFactors | None = None
 
     @property
@@ -118,6 +119,10 @@ class Factors(_Result):
             f"{_changes_sentence(self.amplitude_bound, self.delay_bound, self.delay_measure)} from "
             f"P = {r.data_decimation}, Q = {r.frequency_decimation} (tolerance {100 * self.tolerance:g} %)"
         )
+
+    def _shown(self) -> Shown:
+        rows = [] if self.windowed is None else [("", self.windowed.sentence)]
+        return Shown("Factors", [("", self.sentence), *rows])
 
     def _columns(self) -> dict[str, Any]:
         return self.changes._columns()
@@ -253,7 +258,7 @@ def prior_bounds(
 _OVER: tuple[Literal["data", "frequency"], ...] = ("data", "frequency")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class KeyFrequencies(_Result):
     """The fewest frequency bins that hold a share of a target's weight, ready to evaluate pairs at them alone.
 
@@ -271,7 +276,7 @@ class KeyFrequencies(_Result):
     rate_hz: float
     n_samples: int
     settings: Settings
-    _plan: CoreKeyFrequencies = field(repr=False)
+    _plan: CoreKeyFrequencies
 
     def evaluate(self, target: ArrayLike, measured: ArrayLike) -> Tracking:
         """Amplitude and delay over these bins alone: Eqs 6-12 with all other weights at zero.
@@ -289,6 +294,11 @@ class KeyFrequencies(_Result):
         """Plain Python values: numbers, strings, lists, dicts."""
         plain = {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.name != "_plan"}
         return plain | {"frequency_hz": self.frequency_hz.tolist(), "settings": dataclasses.asdict(self.settings)}
+
+    def _shown(self) -> Shown:
+        n = self.frequency_hz.size
+        rows = [("frequency", extent(self.frequency_hz, 1.0, "Hz"))]
+        return Shown(f"KeyFrequencies: {n}, which hold {100 * self.share_held:.5g} % of the weight", rows)
 
     def _columns(self) -> dict[str, Any]:
         return {"frequency_hz": self.frequency_hz}

@@ -21,7 +21,7 @@ def _time_s(n_samples: int, rate_hz: float) -> NDArray[np.float64]:
     return np.arange(n_samples) / rate_hz
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Indices(_Result):
     """The time-domain indices in use beside the FEI (method section 9). Lag makes `tracking_indicator` positive.
 
@@ -42,7 +42,7 @@ class Indices(_Result):
         return {f.name: [getattr(self, f.name)] for f in dataclasses.fields(self)}
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class IndexHistories(_Result):
     """Those indices that are histories, at every sample: arrays (n_samples,)."""
 

@@ -14,6 +14,7 @@ from rthstrack.errors import SettingError, SignalError
 from rthstrack.evaluation.inputs import _count, _samples, merged, settled
 from rthstrack.evaluation.results import _made, _Numbers
 from rthstrack.evaluation.settings import MonitorSettings
+from rthstrack.values import Shown, extent
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from rthstrack.evaluation.settings import MonitorKeywords
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Readings(_Numbers["NDArray[np.float64]", "NDArray[np.float64]"]):
     """Readings of one call, a row an actuator and window; intervals with (low, high) last.
 
@@ -43,6 +44,10 @@ class Readings(_Numbers["NDArray[np.float64]", "NDArray[np.float64]"]):
 
     def __len__(self) -> int:
         return len(self.index)
+
+    def _shown(self) -> Shown:
+        heading = f"Readings, {self.settings.estimator}: {len(self)}, {np.count_nonzero(self.valid)} judged"
+        return Shown(heading, [*self._number_rows(), ("time", extent(self.time_s, 1.0, "s"))])
 
     def _columns(self) -> dict[str, Any]:
         columns: dict[str, Any] = {name: getattr(self, name) for name in ("index", "time_s", "centre_s", "actuator")}

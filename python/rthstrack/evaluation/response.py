@@ -10,13 +10,14 @@ from rthstrack._core import frequency_response as core_frequency_response
 from rthstrack._core import frequency_slopes as core_frequency_slopes
 from rthstrack.evaluation.inputs import _band, _number, _single
 from rthstrack.evaluation.results import _Result
+from rthstrack.values import Shown, extent, with_interval
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FrequencyResponse(_Result):
     """Gain, phase, delay and coherence of measured over target by Welch's method: arrays (n_bins,).
 
@@ -53,6 +54,16 @@ class FrequencyResponse(_Result):
         """Everything over frequency by name, the ends of the intervals apart: arrays (n_bins,)."""
         return self._columns()
 
+    def _shown(self) -> Shown:
+        of = f"{self.frequency_hz.size} frequencies, {self.n_segments} segments of {self.segment_s:g} s"
+        rows = [
+            ("frequency", extent(self.frequency_hz, 1.0, "Hz")),
+            ("gain", extent(self.gain)),
+            ("delay", extent(self.delay_s, 1e3, "ms")),
+            ("coherence", extent(self.coherence)),
+        ]
+        return Shown(f"FrequencyResponse: {of}", rows)
+
     def _columns(self) -> dict[str, Any]:
         names = ("frequency_hz", "gain", "phase_rad", "delay_s", "coherence", "target_psd", "measured_psd")
         columns = {name: getattr(self, name) for name in names}
@@ -66,7 +77,7 @@ class FrequencyResponse(_Result):
         }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class FrequencySlopes(_Result):
     """Gain and delay as straight lines over the frequencies that carry the energy.
 
@@ -104,6 +115,19 @@ class FrequencySlopes(_Result):
     window: str
     detrend: str
     rate_hz: float
+
+    def _shown(self) -> Shown:
+        def line(value: str, slope: str, factor: float, unit: str, varies: bool) -> str:
+            at, ends = factor * getattr(self, value), [factor * end for end in getattr(self, f"{slope}_interval")]
+            told = f"{at:.4g}{unit}; {with_interval(factor * getattr(self, slope), ends)}{unit} a hertz"
+            return f"{told}; {'varies' if varies else 'does not vary'}"
+
+        heading = f"FrequencySlopes at {self.equivalent_frequency_hz:.4g} Hz, from {self.band_hz[0]:.4g} to "
+        rows = [
+            ("gain", line("gain", "gain_per_hz", 1.0, "", self.gain_varies)),
+            ("delay", line("delay_s", "delay_s_per_hz", 1e3, " ms", self.delay_varies)),
+        ]
+        return Shown(f"{heading}{self.band_hz[1]:.4g} Hz", rows)
 
     def _columns(self) -> dict[str, Any]:
         columns: dict[str, Any] = {}

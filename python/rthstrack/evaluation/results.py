@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 import numpy as np
 
-from rthstrack.errors import RthstrackError
+from rthstrack.values import Value, extent, frame, read_only, with_interval
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 
 _T = TypeVar("_T")
-_N = TypeVar("_N")
-_I = TypeVar("_I")
+_N = TypeVar("_N", covariant=True)
+_I = TypeVar("_I", covariant=True)
 
 
-class _Result:
+class _Result(Value):
     """What all results can do."""
 
     __slots__ = ()
@@ -33,13 +33,7 @@ class _Result:
 
     def to_frame(self) -> pd.DataFrame:
         """A pandas DataFrame, a row an actuator, reading, frequency or sample; needs pandas."""
-        try:
-            import pandas as pd
-        except ImportError:
-            raise RthstrackError(
-                "to_frame needs pandas, which is not installed: pip install 'rthstrack[pandas]'"
-            ) from None
-        return pd.DataFrame(self._columns())
+        return frame(self._columns())
 
     def _columns(self) -> dict[str, Any]:
         raise NotImplementedError
@@ -59,7 +53,7 @@ def _plain(value: Any) -> Any:
     return value
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class _Numbers(_Result, Generic[_N, _I]):
     """What every tracking says in numbers, in the order in which it is written; the core's names."""
 
@@ -84,15 +78,40 @@ class _Numbers(_Result, Generic[_N, _I]):
             columns |= dict(ends) or {name: values.reshape(-1)}
         return columns
 
+    def _number_rows(self, at: int | None = None) -> list[tuple[str, str]]:
+        """Gain, delay and where they hold, of many as least to greatest, or of the one at this place."""
+        rows = []
+        for label, name, interval, factor, unit in _FIRST:
+            values = np.asarray(getattr(self, name) if at is None else getattr(self, name)[at])
+            if values.ndim:
+                rows.append((label, extent(values, factor, unit)))
+                continue
+            ends: Any = getattr(self, interval) if interval else (math.nan, math.nan)
+            low, high = ends if at is None or not interval else ends[at]
+            rows.append((label, with_interval(factor * float(values), (factor * low, factor * high), unit)))
+        return rows
 
-def _made(kind: type[_T], *parts: Mapping[str, Any]) -> _T:
+
+_FIRST = (
+    ("amplitude", "amplitude", "amplitude_interval", 1.0, ""),
+    ("delay", "delay_s", "delay_interval_s", 1e3, "ms"),
+    ("at", "equivalent_frequency_hz", "", 1.0, "Hz"),
+)
+
+
+def _made(kind: type[_T], *parts: Mapping[str, Any], scalars: bool = False) -> _T:
     """A frozen dataclass without slots from all of its fields.
 
-    Its own constructor sets them one by one: a fifth of the time in which a short record is evaluated.
+    Its own constructor sets them one by one: a fifth of the time in which a short record is evaluated. scalars: no
+    field is an array.
     """
     made = object.__new__(kind)
+    fields = made.__dict__
     for part in parts:
-        made.__dict__.update(part)
+        fields.update(part)
+    for name, value in () if scalars else fields.items():
+        if type(value) is np.ndarray:
+            fields[name] = read_only(value)
     return made
 
 

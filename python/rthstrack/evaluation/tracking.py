@@ -11,7 +11,7 @@ import math
 import threading
 from collections import OrderedDict
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar, Unpack
+from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar, Unpack, overload
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from rthstrack.evaluation.bad_samples import _bad_samples, bad_words
 from rthstrack.evaluation.inputs import _count, _number, _pair, merged, of_each, settled
 from rthstrack.evaluation.results import NUMBERS, _made, _Numbers
 from rthstrack.evaluation.settings import MovingSettings, Settings
+from rthstrack.values import Shown, extent
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -35,8 +36,31 @@ if TYPE_CHECKING:
 _T = TypeVar("_T")
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Tracking(_Numbers["float | NDArray[np.float64]", "tuple[float, float] | NDArray[np.float64]"]):
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from typing_extensions import (
+        TypeVar as _TypeVar,  # the checkers' own: a tracking is one pair's unless it says other
+    )
+
+    _Number = _TypeVar("_Number", covariant=True, default=float)
+    _Interval = _TypeVar("_Interval", covariant=True, default=tuple[float, float])
+    _Fei = _TypeVar("_Fei", covariant=True, default=complex)
+    _Bad = _TypeVar("_Bad", covariant=True, default=tuple[BadSamples, ...])
+    _Words = _TypeVar("_Words", covariant=True, default=str)
+    _Values = _TypeVar("_Values", covariant=True, default=tuple[float, ...])
+else:
+    _Number, _Interval, _Fei, _Bad, _Words, _Values = map(
+        TypeVar, ("_Number", "_Interval", "_Fei", "_Bad", "_Words", "_Values")
+    )
+
+# Of one pair; as defaults of any type.
+_NOTHING: Any = ()
+_NO_WORDS: Any = ""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Tracking(_Numbers[_Number, _Interval], Generic[_Number, _Interval, _Fei, _Bad, _Words, _Values]):
     """Amplitude and delay of measured over target for one record (Eqs 6-12, or by alignment).
 
     Scalars for one pair, arrays of shape (n_actuators,) for several; intervals are (low, high), or (n_actuators, 2).
@@ -51,20 +75,32 @@ class Tracking(_Numbers["float | NDArray[np.float64]", "tuple[float, float] | ND
     (sum to one), `target_spectrum` and `measured_spectrum` (complex DFT of the windowed, zero-padded signals).
     """
 
-    fei: complex | NDArray[np.complex128]
+    fei: _Fei
     n_bins: int
     delta_f_hz: float
     rate_hz: float
     n_samples: int
     settings: Settings
-    bad_samples: tuple[BadSamples, ...] | tuple[tuple[BadSamples, ...], ...] = ()
-    reason: str | tuple[str, ...] = ""
-    reason_code: str | tuple[str, ...] = ""
-    reason_values: tuple[float, ...] | tuple[tuple[float, ...], ...] = ()
+    bad_samples: _Bad = _NOTHING
+    reason: _Words = _NO_WORDS
+    reason_code: _Words = _NO_WORDS
+    reason_values: _Values = _NOTHING
     frequency_hz: NDArray[np.float64] | None = None
     weights: NDArray[np.float64] | None = None
     target_spectrum: NDArray[np.complex128] | None = None
     measured_spectrum: NDArray[np.complex128] | None = None
+
+    def _shown(self) -> Shown:
+        reason: Any = self.reason
+        each: list[tuple[str, str]] = []
+        if not isinstance(reason, str):
+            n = len(reason)
+            told = (", ".join(f"{label} {text}" for label, text in self._number_rows(i)) for i in range(n))
+            each = [(f"actuator {i}", text) for i, text in enumerate(told, start=1)]
+        of = f" of {len(each)} actuators" if each else ""
+        heading = f"Tracking{of}, {self.settings.estimator}: {self.n_samples} samples at {self.rate_hz:g} Hz"
+        why = dict.fromkeys([reason] if isinstance(reason, str) else reason)
+        return Shown(heading, [*(each or self._number_rows()), *(("", text) for text in why if text)])
 
     def _columns(self) -> dict[str, Any]:
         several = isinstance(self.reason, tuple)
@@ -79,13 +115,23 @@ class Tracking(_Numbers["float | NDArray[np.float64]", "tuple[float, float] | ND
         return (
             {"actuator": np.arange(n)}
             | self._number_columns()
-            | {"fei": np.atleast_1d(self.fei)}
+            | {"fei": np.atleast_1d(np.asarray(self.fei))}
             | {name: list(values) for name, values in each.items()}
             | {name: [value] * n for name, value in same.items()}
         )
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+#: Of several actuators.
+Trackings: TypeAlias = (
+    "Tracking[NDArray[np.float64], NDArray[np.float64], NDArray[np.complex128], tuple[tuple[BadSamples, ...], ...], "
+    "tuple[str, ...], tuple[tuple[float, ...], ...]]"
+)
+#: One pair, as far as types tell, and several.
+One: TypeAlias = "np.ndarray[tuple[int], np.dtype[Any]] | Sequence[float]"
+Several: TypeAlias = "np.ndarray[tuple[int, int], np.dtype[Any]] | Sequence[Sequence[float]]"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class MovingTracking(_Numbers["NDArray[np.float64]", "NDArray[np.float64]"]):
     """The same over moving windows: arrays (n_readings,) or (n_readings, n_actuators), intervals with (low, high) last.
 
@@ -105,6 +151,15 @@ class MovingTracking(_Numbers["NDArray[np.float64]", "NDArray[np.float64]"]):
     reason: tuple[str, ...] | tuple[tuple[str, ...], ...]
     reason_code: tuple[str, ...] | tuple[tuple[str, ...], ...]
     reason_values: tuple[tuple[float, ...], ...] | tuple[tuple[tuple[float, ...], ...], ...]
+
+    def _shown(self) -> Shown:
+        of = f" of {self.amplitude.shape[1]} actuators" if self.amplitude.ndim > 1 else ""
+        n, known = self.valid.size, np.count_nonzero(self.valid)
+        windows = f"{n} windows of {self.window_s:g} s, one every {self.hop_s:g} s, {known} judged"
+        span = extent(self.time_s, 1.0, "s")
+        return Shown(
+            f"MovingTracking{of}, {self.settings.estimator}: {windows}", [*self._number_rows(), ("centres", span)]
+        )
 
     def _columns(self) -> dict[str, Any]:
         n_actuators = 1 if self.amplitude.ndim == 1 else self.amplitude.shape[1]
@@ -171,12 +226,59 @@ class Evaluator:
         """Spacing of the kept bins, Q rate / n (Eq 9), in hertz."""
         return self._plan.delta_f_hz
 
-    def evaluate(self, target: ArrayLike, measured: ArrayLike, *, weights: bool = False) -> Tracking:
+    @overload
+    def evaluate(self, target: One, measured: One, *, weights: bool = False) -> Tracking: ...
+
+    @overload
+    def evaluate(  # type: ignore[overload-overlap]
+        self, target: Several, measured: Several, *, weights: bool = False
+    ) -> Trackings: ...
+
+    @overload
+    def evaluate(self, target: ArrayLike, measured: ArrayLike, *, weights: bool = False) -> Tracking: ...
+
+    def evaluate(self, target: ArrayLike, measured: ArrayLike, *, weights: bool = False) -> Any:
         """As the function `evaluate`, for signals of this length and rate."""
         t, m = _pair(target, measured)
         if len(t) != self.n_samples:
             raise SignalError(f"this evaluator is planned for {self.n_samples} samples, not for {len(t)}")
         return _tracking(self._plan, self.settings, self.rate_hz, t, m, weights)
+
+
+@overload
+def evaluate(
+    target: One,
+    measured: One,
+    rate_hz: float,
+    settings: Settings | None = None,
+    *,
+    weights: bool = False,
+    **changes: Unpack[EvaluationKeywords],
+) -> Tracking: ...
+
+
+@overload
+def evaluate(  # type: ignore[overload-overlap]
+    target: Several,
+    measured: Several,
+    rate_hz: float,
+    settings: Settings | None = None,
+    *,
+    weights: bool = False,
+    **changes: Unpack[EvaluationKeywords],
+) -> Trackings: ...
+
+
+@overload
+def evaluate(
+    target: ArrayLike,
+    measured: ArrayLike,
+    rate_hz: float,
+    settings: Settings | None = None,
+    *,
+    weights: bool = False,
+    **changes: Unpack[EvaluationKeywords],
+) -> Tracking: ...
 
 
 def evaluate(
@@ -187,7 +289,7 @@ def evaluate(
     *,
     weights: bool = False,
     **changes: Unpack[EvaluationKeywords],
-) -> Tracking:
+) -> Any:
     """Amplitude and delay of measured over target for whole records (Guo, Xu and Chen 2014, Eqs 1-12; or by alignment).
 
     FEI = sum O_k conj(I_k) |I_k|^(l-2) / sum |I_k|^l,  f_eq = sum f_k |I_k|^l / sum |I_k|^l,
@@ -270,7 +372,7 @@ def _tracked(found: Sequence[Any], ndim: int, **about: Any) -> Tracking:
         fields = {name: tuple(one[name] for one in found) for name in _REASON}
         fields["fei"] = np.array([one["fei"] for one in found])
         fields["bad_samples"] = tuple(_bad_samples(one["bad_samples"], about["rate_hz"]) for one in found)
-    return _made(Tracking, numbers, fields, about)
+    return _made(Tracking, numbers, fields, about, scalars=ndim == 1 and about["weights"] is None)
 
 
 def _each_actuator(

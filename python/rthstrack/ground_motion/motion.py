@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from rthstrack.errors import SettingError, SignalError
 from rthstrack.ground_motion.checks import MOST_SAMPLES, oscillator_mistakes
 from rthstrack.recording.readers.at2 import STANDARD_GRAVITY_M_S2
+from rthstrack.values import Shown, Value
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
 _POINTS_PER_PERIOD = 64
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class GroundMotion:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class GroundMotion(Value):
     """Ground acceleration (n_samples,) in m/s2, read-only, at `rate_hz`.
 
     `source` says where it comes from, `notes` what was done to it, in order.
@@ -28,7 +29,7 @@ class GroundMotion:
     """
 
     name: str
-    acceleration_m_s2: NDArray[np.float64] = field(repr=False)
+    acceleration_m_s2: NDArray[np.float64]
     rate_hz: float
     source: str
     notes: tuple[str, ...] = ()
@@ -48,6 +49,11 @@ class GroundMotion:
             )
         values.setflags(write=False)
         object.__setattr__(self, "acceleration_m_s2", values)
+
+    def _shown(self) -> Shown:
+        n = len(self.acceleration_m_s2)
+        rows = [("source", self.source), *(("", note) for note in self.notes)]
+        return Shown(f"GroundMotion '{self.name}': {n} samples at {self.rate_hz:g} Hz", rows)
 
     @property
     def duration_s(self) -> float:

@@ -65,6 +65,33 @@ def read_chosen(
     contents = read_contents(path, block=block, lines=lines)
     contents, units, scale = of_time(contents, time, units or {}, scale or {}, file)
     recording = recording_from(contents, file, rate_hz=rate_hz, time=time, resample_hz=resample_hz)
+    return choose(
+        recording,
+        targets=targets,
+        measured=measured,
+        commands=commands,
+        units=units,
+        scale=scale,
+        fill=fill,
+        start_s=start_s,
+        end_s=end_s,
+    )
+
+
+def choose(
+    recording: Recording,
+    *,
+    targets: Sequence[str] = (),
+    measured: Sequence[str] = (),
+    commands: Sequence[str] = (),
+    units: Mapping[str, str] | None = None,
+    scale: Mapping[str, float] | None = None,
+    fill: int | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
+) -> ChosenPairs:
+    """The same of a recording that was read."""
+    file = recording.file
     if recording.rate_hz is None and all(c.time is None or c.time.rate_hz is None for c in recording.channels):
         raise _no_rate(recording.rate_source, file)
     pairs, proposal = list(zip(targets, measured, strict=False)), None
@@ -78,8 +105,8 @@ def read_chosen(
     if fill:
         recording = recording.filled(fill)
     recording = on_one_clock(recording, (*judged, *commands))
-    recording = _in_units(recording, units, judged)
-    recording = recording.scaled(scale)
+    recording = _in_units(recording, units or {}, judged)
+    recording = recording.scaled(scale or {})
     for i, (target, answered) in enumerate(pairs):
         for one in (answered, *commands[i : i + 1]):
             recording = _converted(recording, target, one)

@@ -7,17 +7,20 @@ import math
 import re
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rthstrack.errors import ChannelError, RecordingError, SettingError
 from rthstrack.said import Said
 from rthstrack.units import stem_and_unit, units_from_names
+from rthstrack.values import Shown, Value, extent, frame, needed
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
+    from collections.abc import Collection, Iterator, Mapping, Sequence
 
+    import pandas as pd
+    import xarray as xr
     from numpy.typing import NDArray
 
     from rthstrack.recording.readers.contents import Contents, Series
@@ -41,8 +44,8 @@ class OwnTime:
     said: tuple[Said, ...] = ()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Channel:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Channel(Value):
     """One channel: `values` (n_samples,), read-only. `path` is its place in the file; `unit` None if not stated.
 
     time: its own clock where a file has several (`on_one_clock`), None where it is the recording's.
@@ -52,13 +55,23 @@ class Channel:
     name: str
     path: str
     unit: str | None
-    values: NDArray[np.float64] = field(repr=False)
+    values: NDArray[np.float64]
     time: OwnTime | None = None
     is_time: bool = False
 
+    def __len__(self) -> int:
+        return len(self.values)
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Recording:
+    def _shown(self) -> Shown:
+        rows = [("path", self.path)] if self.path != self.name else []
+        rows.append(("values", extent(self.values, 1.0, self.unit or "")))
+        if self.time is not None:
+            rows.append(("time", self.time.source))
+        return Shown(f"Channel '{self.name}': {len(self)} samples", rows)
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Recording(Value):
     """A file's channels, sampled at `rate_hz` (None if the file does not say) from `start_s` of its own time.
 
     `rate_source` says in words where the rate comes from, or why there is none. `notes` says what else was found,
@@ -77,6 +90,91 @@ class Recording:
     def __getitem__(self, selector: str) -> Channel:
         """The channel of this name, path, or `#index`."""
         return self.channel(selector)
+
+    def __len__(self) -> int:
+        """How many channels there are."""
+        return len(self.channels)
+
+    def __iter__(self) -> Iterator[Channel]:
+        return iter(self.channels)
+
+    def __contains__(self, selector: object) -> bool:
+        """Whether `selector` names one channel, or is one of them."""
+        if not isinstance(selector, str):
+            return any(selector is channel for channel in self.channels)
+        try:
+            self.channel(selector)
+        except ChannelError:
+            return False
+        return True
+
+    @property
+    def time_s(self) -> NDArray[np.float64]:
+        """The times of the samples, of the longest channel on the recording's clock: start_s + i / rate_hz.
+
+        Raises RecordingError without a rate.
+        """
+        if self.rate_hz is None:
+            raise RecordingError(f"no times: {self.rate_source}", file=self.file, advice="give {rate_hz}")
+        n = max((len(channel) for channel in self.channels if channel.time is None), default=0)
+        return frozen(self.start_s + np.arange(n) / self.rate_hz)
+
+    def to_frame(self) -> pd.DataFrame:
+        """The channels but those of the time as columns of a pandas DataFrame, times (time_s) as its index.
+
+        Without a rate the index counts samples; a channel that ends sooner ends in NaN; `attrs["units"]` has the units.
+        Raises RecordingError for channels with clocks of their own, RthstrackError without pandas.
+        """
+        needed("pandas", "to_frame")
+        index, columns = self._on_index()
+        made = frame({name: values for name, (values, _) in columns.items()}, index[1])
+        made.index.name = index[0]
+        made.attrs["units"] = {name: unit for name, (_, unit) in columns.items()}
+        return made
+
+    def to_xarray(self) -> xr.Dataset:
+        """The same as an xarray Dataset along `time_s`, each channel with its unit in `attrs`."""
+        xarray = needed("xarray", "to_xarray")
+        (name, index), columns = self._on_index()
+        units = {channel: {} if unit is None else {"units": unit} for channel, (_, unit) in columns.items()}
+        data = {channel: (name, values, units[channel]) for channel, (values, _) in columns.items()}
+        about: dict[str, Any] = {"file": self.file, "rate_source": self.rate_source}
+        about |= {} if self.rate_hz is None else {"rate_hz": self.rate_hz}
+        seconds = {"units": "s"} if self.rate_hz is not None else {}
+        made: xr.Dataset = xarray.Dataset(data, {name: (name, index, seconds)}, about)
+        return made
+
+    def _on_index(
+        self,
+    ) -> tuple[tuple[str, NDArray[np.generic]], dict[str, tuple[NDArray[np.float64], str | None]]]:
+        """The index with its name, and each channel of one length with its unit, by a name that only it has."""
+        channels = [channel for channel in self.channels if not channel.is_time]
+        if own := [channel for channel in channels if channel.time is not None]:
+            raise RecordingError(
+                f"{len(own)} of {len(channels)} channels have clocks of their own, such as '{own[0].path}'",
+                file=self.file,
+                code="own_times",
+                advice="put those you need on one: rthstrack.recording.on_one_clock(recording, names)",
+            )
+        n = max(map(len, channels), default=0)
+        has_rate = self.rate_hz is not None
+        index: NDArray[np.generic] = self.time_s[:n] if has_rate else np.arange(n)
+        index_name = "time_s" if has_rate else "sample"
+        columns = {}
+        for i, channel in enumerate(self.channels):
+            if channel.is_time:
+                continue
+            taken = [index_name, *(one for c in self.channels if c is not channel for one in (c.name, c.path))]
+            name = next((one for one in (channel.name, channel.path) if one not in taken), f"#{i}")
+            missing = np.full(n - len(channel), np.nan)
+            columns[name] = (np.concatenate((channel.values, missing)), channel.unit)
+        return (index_name, index), columns
+
+    def _shown(self) -> Shown:
+        rows = [(c.name, f"{len(c)} samples{f' in {c.unit}' if c.unit else ''}") for c in self.channels]
+        rate = "no rate" if self.rate_hz is None else f"{self.rate_hz:g} Hz"
+        n = len(self.channels)
+        return Shown(f"Recording {self.file} ({self.format}): {n} channel{'s' * (n != 1)}, {rate}", rows)
 
     def channel(self, selector: str) -> Channel:
         """The channel that `selector` names.

@@ -23,15 +23,14 @@ from rthstrack.report.drawing import Blocks, _drawing, _signal
 from rthstrack.report.record import NOT_DETERMINED, _reasons, _why, result_record
 from rthstrack.report.written import _interval, _number, _setting, flat
 from rthstrack.verdict import display
+from rthstrack.verdict.assessment import Assessment
 from rthstrack.verdict.sentence import reason
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from rthstrack.verdict.assessment import Assessment
 
-
-def write_report(assessments: Sequence[Assessment], path: str | Path) -> None:
+def write_report(assessments: Assessment | Sequence[Assessment], path: str | Path) -> None:
     """Write the HTML report of one or several assessments to `path`.
 
     Above 200,000 samples a trace is drawn by the extremes of groups of samples, and the page says so; its numbers are
@@ -46,8 +45,10 @@ def write_report(assessments: Sequence[Assessment], path: str | Path) -> None:
         ) from error
 
 
-def report_html(assessments: Sequence[Assessment]) -> str:
+def report_html(assessments: Assessment | Sequence[Assessment]) -> str:
     """The text of the page that `write_report` writes."""
+    if isinstance(assessments, Assessment):
+        assessments = [assessments]
     if not assessments:
         raise SettingError("a report needs at least one assessment, none was given; evaluate a recording first")
     blocks = Blocks()

@@ -5,12 +5,13 @@ from __future__ import annotations
 import csv
 import dataclasses
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rthstrack.errors import RecordingError, SettingError
 from rthstrack.evaluation.results import _Result, json_ready
 from rthstrack.studies.settings import _listed
+from rthstrack.values import Shown
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -71,7 +72,7 @@ class Cell:
     share: float = math.nan
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Study(_Result):
     """The cells of a study, by source, window, weight power, P and Q in this order, and what was asked for.
 
@@ -80,7 +81,12 @@ class Study(_Result):
 
     sources: tuple[StudiedSource, ...]
     settings: StudySettings
-    cells: tuple[Cell, ...] = field(repr=False)
+    cells: tuple[Cell, ...]
+
+    def _shown(self) -> Shown:
+        s = self.settings
+        rows = [(source.name, f"{source.n_samples} samples at {source.rate_hz:g} Hz") for source in self.sources]
+        return Shown(f"Study, {s.estimator}: {len(self.cells)} cells, P {_listed(s.P)}, Q {_listed(s.Q)}", rows)
 
     def select(
         self,

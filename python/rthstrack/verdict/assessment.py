@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rthstrack.errors import SettingError, SignalError
@@ -18,7 +18,8 @@ from rthstrack.evaluation.inputs import _number, _single, settled
 from rthstrack.evaluation.response import frequency_response, frequency_slopes
 from rthstrack.evaluation.settings import Settings
 from rthstrack.evaluation.tracking import Evaluator, bridged, evaluate_moving
-from rthstrack.said import failed
+from rthstrack.said import coded, failed
+from rthstrack.values import Shown, Value
 from rthstrack.verdict.argument import argument as argued
 from rthstrack.verdict.difference import differ
 from rthstrack.verdict.display import signal_roles
@@ -49,8 +50,8 @@ MOVING_S = 4.0
 READINGS_PER_WINDOW = 16
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Assessment:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Assessment(Value):
     """One pair, judged.
 
     `part` is "whole" (target to measured), "compensator" (target to command) or "actuator" (command to measured).
@@ -74,8 +75,8 @@ class Assessment:
     unit: str | None
     rate_hz: float
     start_s: float
-    target: NDArray[np.float64] = field(repr=False)
-    measured: NDArray[np.float64] = field(repr=False)
+    target: NDArray[np.float64]
+    measured: NDArray[np.float64]
     tracking: Tracking  # evaluated with weights=True: spectra and weights inside
     moving: MovingTracking | None
     moving_note: Said | None  # why there is no moving evaluation, when there is none
@@ -137,8 +138,19 @@ class Assessment:
         """The moving windows that are drawn with the trusted ones: of the estimate asked for, or the published one."""
         return self.published_moving if self.moving is self.trusted_moving else self.moving
 
+    def _shown(self) -> Shown:
+        rows = [
+            *([("file", self.file)] if self.file else []),
+            ("pair", f"{self.target_name}, {self.measured_name}: {self.target.size} samples at {self.rate_hz:g} Hz"),
+        ]
+        for t in (self.tracking, self.beside):
+            rows += [(f"{label}, {t.settings.estimator}", text) for label, text in t._number_rows()[:2]]
+        rows += [("", self.argument)] + ([("limits", self.conclusion)] if self.conclusion else [])
+        rows += [("warnings", ", ".join(one.code for one in map(coded, self.warnings)))] if self.warnings else []
+        return Shown(f"Assessment: {self.verdict}", rows)
 
-def assess(
+
+def assess_samples(
     target: ArrayLike,
     measured: ArrayLike,
     rate_hz: float,
@@ -160,19 +172,7 @@ def assess(
     start_s: float = 0.0,
     origin: Mapping[str, Any] | None = None,
 ) -> Assessment:
-    """Judges one pair in every way there is: whole record, moving windows, over frequency, indices, warnings.
-
-    target, measured: (n_samples,) in `unit` (and `measured_unit`, the same unless given); settings: of `evaluate`;
-    their expected_delay_s is the trusted estimate's too, and its alone where the estimator is "fei".
-    choose: "P", "Q" or both are chosen within `tolerance` (`choose_factors`), in place of those in settings. They fit
-    the whole record only: moving windows have 1 in their place.
-    moving_s, hop_s: moving windows; by default 4 s but at most a quarter of the record, sixteen readings a window.
-    limits: what is allowed (`gates`). structure: the test whose only actuator this is; its critical delay at the
-    measured gain is a limit, too, unless one is given. `origin` says what was done to the samples before.
-
-    Raises SignalError, SettingError; where only the moving evaluation or the frequency response is impossible, it is
-    None and its note says why, unless `moving_s` or `hop_s` asked for it.
-    """
+    """Judges one pair of arrays (n_samples,) as `assess` of `recorded` describes."""
     asked_for = settings or Settings()
     settings = without_trusted(asked_for)
     limits = limits or Limits()

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rthstrack.units import is_length
+from rthstrack.values import with_interval as with_interval
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -78,24 +79,6 @@ def significant(value: float, digits: int = 4) -> str:
         return f"{value:.{max(digits - 1 - power, 0)}f}".replace("-", "\N{MINUS SIGN}")
     mantissa = mantissa.replace("-", "\N{MINUS SIGN}")
     return f"{mantissa}\N{MULTIPLICATION SIGN}10{str(power).translate(_SUPERSCRIPTS)}"
-
-
-def with_interval(value: float, interval: Sequence[float], unit: str = "") -> str:
-    """A number with its interval, "12.0034 ms (12.0012 to 12.0056)", to the second digit of half the interval's width.
-
-    Never more than seven significant digits, and four where there is no interval.
-    """
-    tail = f" {unit}" if unit else ""
-    if not math.isfinite(value):
-        return "not determined"
-    low, high = (float(end) for end in interval)
-    if not math.isfinite(high - low):
-        return f"{value:.4g}{tail}"
-    most = 6 - math.floor(math.log10(abs(value))) if value else 9
-    half = (high - low) / 2
-    wanted = 1 - int(f"{half:.1e}".split("e")[1]) if half > 0 else most
-    places = max(min(wanted, most), 0)
-    return f"{value:.{places}f}{tail} ({low:.{places}f} to {high:.{places}f})"
 
 
 def reasons(moving: MovingTracking) -> list[tuple[int, str]]:

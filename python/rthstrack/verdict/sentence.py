@@ -64,7 +64,7 @@ _BOUNDLESS_S = 1.0
 
 def reason(tracking: Tracking) -> Said | None:
     """Why a number or its interval is missing; None where nothing is, and for the published estimator's intervals."""
-    code, values = str(tracking.reason_code), cast("tuple[float, ...]", tracking.reason_values)
+    code, values = str(tracking.reason_code), tracking.reason_values
     if not tracking.reason:
         return undetermined("measured does not move", *_NO_MOTION) if math.isnan(float(tracking.delay_s)) else None
     # So wide that the number means nothing but that.

@@ -20,6 +20,7 @@ from rthstrack._core import from_matrices as core_from_matrices
 from rthstrack._core import sdof as core_sdof
 from rthstrack._core import shear_building as core_shear_building
 from rthstrack.errors import ConfigurationError, SettingError
+from rthstrack.values import Value
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -123,7 +124,7 @@ class RayleighDamping:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Structure:
+class Structure(Value):
     """The whole structure, elastic: mass, damping, stiffness (n, n), `influence` (n,) of the ground motion.
 
     What a specimen or a restoring element with `part_of_structure` brings is subtracted from it by the virtual test.

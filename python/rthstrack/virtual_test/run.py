@@ -15,6 +15,7 @@ import numpy as np
 
 from rthstrack._core import __version__
 from rthstrack.errors import ConfigurationError, RecordingError, SignalError
+from rthstrack.values import Shown, Value
 from rthstrack.virtual_test.configuration import to_table, virtual_test_from
 
 if TYPE_CHECKING:
@@ -114,8 +115,8 @@ def _channels(run: Run) -> dict[str, tuple[NDArray[np.float64], str]]:
     return channels if run.ground_motion is None else channels | {"ground_motion": (run.ground_motion, "m/s^2")}
 
 
-@dataclass(frozen=True, slots=True)
-class CriticalDelay:
+@dataclass(frozen=True, slots=True, repr=False)
+class CriticalDelay(Value):
     """The constant delay at which the loop's first pair of roots reaches the imaginary axis, and its frequency there.
 
     `delay_s` 0: unstable even without a delay; infinite: no delay makes it unstable. `exact` False: of the elastic
@@ -128,8 +129,8 @@ class CriticalDelay:
     exact: bool
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Run:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Run(Value):
     """A finished virtual test. Signals are (n_samples,) for one actuator, else (n_samples, n_actuators); SI units.
 
     displacement (n_samples, n_dof) relative to the ground, ground_motion (n_samples,) in m/s2, None for actuators
@@ -152,6 +153,20 @@ class Run:
     error_estimate: float
     critical_delay: CriticalDelay | None
     target_motion: TargetMotion | None = None
+
+    def _shown(self) -> Shown:
+        peaks = {name: np.abs(getattr(self, name)).max(initial=0.0) for name in ("target", "measured", "force")}
+        n = len(self.test.actuators)
+        rows = [
+            ("motion", self.motion_name),
+            ("actuators", str(n)),
+            ("target", f"peak {1e3 * peaks['target']:.4g} mm"),
+            ("measured", f"peak {1e3 * peaks['measured']:.4g} mm"),
+            ("force", f"peak {peaks['force'] / 1e3:.4g} kN"),
+        ]
+        if self.critical_delay is not None:
+            rows.append(("critical delay", f"{1e3 * self.critical_delay.delay_s:.4g} ms"))
+        return Shown(f"Run: {self.n_samples} samples at {self.rate_hz:g} Hz", rows)
 
     @property
     def n_samples(self) -> int:

@@ -12,6 +12,7 @@ import numpy as np
 
 from rthstrack._core import VirtualTest as CoreVirtualTest
 from rthstrack.errors import ConfigurationError, SettingError, UnstableError
+from rthstrack.values import Value
 from rthstrack.virtual_test.parts import CONVERTERS, DelayHistory
 from rthstrack.virtual_test.run import CriticalDelay, Run
 
@@ -29,8 +30,8 @@ if TYPE_CHECKING:
 Result = TypeVar("Result")
 
 
-@dataclass(frozen=True, slots=True)
-class DelayDamping:
+@dataclass(frozen=True, slots=True, repr=False)
+class DelayDamping(Value):
     """What a delay does to each mode: damping ratios with and without it, and the first-order estimate.
 
     `first_order_change` is -(K k_e / k) omega tau / 2 with k_e the real part of the specimen's dynamic stiffness at the

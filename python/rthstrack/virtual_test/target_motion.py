@@ -18,6 +18,7 @@ from rthstrack.errors import RecordingError, SettingError
 from rthstrack.keyed_table import NUMBER, Table, one_of
 from rthstrack.recording.motion_files import KEYS, Quantity, file_mistakes, read_motion
 from rthstrack.units import is_length, length_factor
+from rthstrack.values import Value
 
 if TYPE_CHECKING:
     import os
@@ -149,7 +150,7 @@ class SweepTarget:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RecordedTarget:
+class RecordedTarget(Value):
     """A displacement (n_samples,) in m at `rate_hz`, read-only, such as an earlier test's target.
 
     Between samples it is the cubic spline that rests at both ends. Where it does not begin or end at zero it is led
