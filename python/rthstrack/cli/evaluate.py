@@ -147,7 +147,7 @@ def _assess(
     part: str,
     target: str,
     measured: str,
-    proposal: str | None,
+    proposal: Said | None,
     args: argparse.Namespace,
 ) -> Assessment:
     asked, answered = recording.channel(target), recording.channel(measured)
@@ -198,7 +198,8 @@ def _assess(
         words = f"no channels were named: judged target '{asked.name}', measured '{answered.name}' ({proposal})"
         said.insert(0, Said(words, "channels_proposed"))
     said += [note for note in notes if note.code not in _GUESSES]
-    guessed = list(dict.fromkeys(note.cause for note in map(coded, recording.notes) if note.code in _GUESSES))
+    guessed = [proposal.cause] if proposal is not None and proposal.code == "pair_guessed" else []
+    guessed += list(dict.fromkeys(note.cause for note in map(coded, recording.notes) if note.code in _GUESSES))
     guessed += [f"but {warning.cause}" for warning in assessment.warnings if warning.code == "copy"]
     verdict = ", ".join([assessment.verdict, *guessed])
     return dataclasses.replace(assessment, warnings=tuple(said), verdict=verdict)

@@ -34,7 +34,7 @@ class ChosenPairs(NamedTuple):
     recording: Recording
     rate_hz: float
     pairs: list[tuple[str, str]]
-    proposal: str | None
+    proposal: Said | None
 
 
 def read_chosen(
