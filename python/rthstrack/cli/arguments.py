@@ -92,6 +92,8 @@ OPTIONS = {
     "resample_hz": "--resample HZ",
     "fill": "--fill SAMPLES",
     "unit": "--unit",
+    "channel": "--channel NAME",
+    "layout": "--layout",
     "align": "--align",
     "start_s": "--start S",
     "end_s": "--end S",

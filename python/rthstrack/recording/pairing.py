@@ -76,7 +76,7 @@ def propose_pair(recording: Recording) -> tuple[list[tuple[str, str]], Said]:
         if of_role > 1 and not {"target", "measured"} <= {one.role for one in named}:
             continue
         try:
-            pairs = _by_name(named, channels, recording.file, copies)
+            pairs = _by_name(named, recording, copies)
         except ChannelError as error:
             several = several or error
             continue
@@ -161,8 +161,9 @@ def _parts(path: str) -> list[str]:
     return [part for part in re.split(r"[/.](?=[^\W\d])", path) if part] or [path]
 
 
-def _by_name(named: list[_Named], channels: tuple[Channel, ...], file: str, copies: list[str]) -> list[tuple[int, int]]:
+def _by_name(named: list[_Named], recording: Recording, copies: list[str]) -> list[tuple[int, int]]:
     """Pairs by name, of one quantity and length: displacement where there is any, else what there is."""
+    channels = recording.channels
     for wanted in (
         ("displacement", None),
         ("force",),
@@ -187,9 +188,9 @@ def _by_name(named: list[_Named], channels: tuple[Channel, ...], file: str, copi
         if not measured:
             continue
         pairs = _matched(targets, measured)
-        rivals = _rivals(pairs, named, channels)
+        rivals = _rivals(pairs, named, recording)
         if not pairs or rivals:
-            raise _several((*targets, *measured, *rivals), channels, file)
+            raise _several((*targets, *measured, *rivals), channels, recording.file)
         return [(t, m) for t, m in pairs if len(channels[t].values) == len(channels[m].values)] or pairs
     return []
 
@@ -226,12 +227,18 @@ def _of_one_kind(target: _Named, one: _Named, channels: tuple[Channel, ...]) -> 
     return (target.quantity is None or one.quantity in (None, target.quantity)) and (a is None or b is None or a == b)
 
 
-def _rivals(pairs: list[tuple[int, int]], named: list[_Named], channels: tuple[Channel, ...]) -> list[_Named]:
-    """Channels without a role that may be measured as well as the one that was found.
+def _alike(recording: Recording, a: int, b: int) -> bool:
+    found = likeness(recording, a, b)
+    return found is not None and found.correlation >= LIKENESS
+
+
+def _rivals(pairs: list[tuple[int, int]], named: list[_Named], recording: Recording) -> list[_Named]:
+    """Channels without a role that by name and motion may be measured as well as the one that was found.
 
     A controller calls what it measures by the quantity alone: beside 'LVDT' or 'measured' a bare 'Position' may be
     meant, and beside a bare 'Position', where target says no more than that, any other position.
     """
+    channels = recording.channels
     by_index = {one.index: one for one in named}
     found = []
     for t, m in pairs:
@@ -245,6 +252,7 @@ def _rivals(pairs: list[tuple[int, int]], named: list[_Named], channels: tuple[C
                 and _of_one_kind(target, one, channels)
                 and (_own(one) <= _own(target) or (measured.role is None and not _own(target)))
                 and not any(_same(channels[i], channels[one.index]) for i in (t, m))
+                and _alike(recording, t, one.index)
             ):
                 found.append(one)
     return found
@@ -277,10 +285,9 @@ def _by_targets_name(named: list[_Named], recording: Recording) -> list[tuple[in
                 and _of_one_kind(target, one, channels)
                 and (ours <= theirs or theirs <= ours)
                 and not _same(channels[target.index], channels[one.index])
+                and _alike(recording, target.index, one.index)
             ):
-                found = likeness(recording, target.index, one.index)
-                if found is not None and found.correlation >= LIKENESS:
-                    alike.append(one)
+                alike.append(one)
         alike = _once(alike, channels)
         if len(alike) > 1:
             raise _several((target, *alike), channels, recording.file)
