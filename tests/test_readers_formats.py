@@ -446,7 +446,7 @@ def test_tdms_channels_have_group_unit_and_increment(tmp_path: Path) -> None:
     recording = read_recording(path)
     assert listed(recording) == [("Target", "DAQ/Target", "mm", 100), ("Measured", "DAQ/Measured", "mm", 100)]
     assert np.array_equal(recording["DAQ/measured"].values, (MEASURED * 1000).astype(np.int16).astype(float))
-    assert (recording.rate_hz, recording.rate_source) == (50.0, "TDMS wf_increment")
+    assert (recording.rate_hz, recording.rate_source) == (50.0, "wf_increment")
     assert "'Log/Events' holds no numbers, no channel" in recording.notes
 
 
@@ -455,7 +455,7 @@ def test_tdms_channels_of_different_increments_leave_the_rate_open(tmp_path: Pat
     recording = read_recording(path)
     assert recording.rate_hz is None
     assert recording.rate_source == (
-        "the channels have different sampling rates (TDMS wf_increment: 1 Hz for 'b/y', 50 Hz for 'a/x')"
+        "the channels have different sampling rates (wf_increment: 1 Hz for 'b/y', 50 Hz for 'a/x')"
     )
 
 

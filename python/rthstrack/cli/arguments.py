@@ -57,8 +57,8 @@ def files_in(paths: Sequence[str]) -> list[str]:
     for path in paths:
         inside = sorted(Path(path).iterdir()) if Path(path).is_dir() else []
         inside = [one for one in inside if one.is_file() and not one.name.startswith(".")]
-        # LabVIEW's index beside a TDMS file is no recording.
-        found += [str(one) for one in inside if one.suffix != ".tdms_index"] or [path]
+        # LabVIEW's index beside a TDMS file is no recording, and the numbers beside a TDM file are read with it.
+        found += [str(one) for one in inside if one.suffix.lower() not in (".tdms_index", ".tdx")] or [path]
     return found
 
 
