@@ -15,7 +15,7 @@ _ROLES = {
         "desiderato desiderata ziel 目標 目标 期望 목표 цель целевое целевой требуемое требуемый требуемая",
         "reference ref setpoint sp demand dmd soll sollwert vorgabe führungsgröße consigne consigna referencia "
         "riferimento référence imposé imposée demandé demandée imposto imposta impuesto impuesta rampe 設定 设定 "
-        "給定 给定 参考 參考 参照 задание заданное заданный заданная задано задающее уставка 설정",
+        "給定 给定 参考 參考 参照 задание задания заданное заданный заданная задано задающее уставка 설정",
         "command cmd cmnd commanded dcmd xc comando comandado comandada comandato comandata commande commandé "
         "commandée predicted extrapolated compensated befehl kommando stellwert 命令 指令 команда 명령 지령",
     ),
@@ -27,7 +27,7 @@ _ROLES = {
         "actuel actuelle effettivo effettiva attuale retour retroalimentacion retroazione rückmeldung tatsächliche "
         "tatsächlicher 反馈 反饋 フィードバック 实际 實際 実際 当前 當前 現在 факт фактическое фактический "
         "фактическая текущее текущий текущая обратная 실제 피드백 현재",
-        "response resp sensor capteur réponse respuesta risposta antwort 応答 响应 響應 отклик 응답",
+        "response resp sensor capteur датчик датчика réponse respuesta risposta antwort 応答 响应 響應 отклик 응답",
     ),
 }
 _QUANTITIES = {
@@ -57,7 +57,24 @@ _QUANTITIES = {
 }
 # x_t and x_m, disp_t and disp_m, ...: a letter behind the quantity.
 _LETTERS = {"t": ("target", 0), "d": ("target", 0), "r": ("target", 1), "c": ("target", 2), "m": ("measured", 0)}
-_BEFORE_LETTER = {"x", "u", "d", "f", "disp", "displ", "displacement", "pos", "position", "force", "frc"}
+_BEFORE_LETTER = {
+    "x",
+    "y",
+    "z",
+    "q",
+    "theta",
+    "phi",
+    "u",
+    "d",
+    "f",
+    "disp",
+    "displ",
+    "displacement",
+    "pos",
+    "position",
+    "force",
+    "frc",
+}
 # Words that say which of several alike a channel is only where nothing else does: a pair may differ in them.
 FILLERS = {"signal", "sig", "channel", "chan", "ch", "data", "value", "values", "val", "out", "output", "in", "input"}
 FILLERS |= {
@@ -106,6 +123,8 @@ _COMPOUND = re.compile(
     r"\b(soll|ist|ziel)(?=weg|position|pos|kraft|lage|hub|verschiebung|last)|"
     r"(?<=weg|ion|aft|hub|age)(soll|ist)(?:wert)?\b"
 )
+# A letter or two before a word that stands in no other: uref, umeas, ctrltarget.
+_BEHIND_LETTERS = re.compile(r"\b([a-z]{1,4})(ref|meas|cmd|fbk|target)\b")
 _JOINED = re.compile(r"\b(set|load|feed|soll|ist) (point|cell|back|wert)\b")
 # Words that say their role only beside others: the current position is no electric current, a set of data no target.
 _BEFORE = (
@@ -123,7 +142,7 @@ def words(name: str) -> list[str]:
     spaced = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", name)
     text = " ".join(re.findall(r"[^\W\d_]+|\d+", _PARTED.sub(r" \g<0> ", plain(spaced))))
     text = _COMPOUND.sub(lambda m: f"{m[1]} " if m[1] else f" {m[2]}", text)
-    text = _JOINED.sub(r"\1\2", text)
+    text = _JOINED.sub(r"\1\2", _BEHIND_LETTERS.sub(r"\1 \2", text))
     for pattern, meant in _BEFORE:
         text = pattern.sub(meant, text)
     return text.split()
