@@ -104,13 +104,13 @@ install-c: toolchain ## C interface: header, libraries, pkg-config file under PR
 	@crates/capi/install.sh "$(PREFIX)"
 
 .PHONY: fuzz
-fuzz: .venv/built toolchain ## odd input at length: 1,000,000 for the monitor's parsers, 200,000 for our reader and the evaluation, 5,000 for each library's reader
+fuzz: .venv/built toolchain ## odd input at length: 1,000,000 for the monitor's parsers, 200,000 for our readers and the evaluation, 5,000 for each library's reader
 	$(call say,fuzz tests)
 	@mkdir -p $(OUT)
 	@RTHSTRACK_FUZZ=200000 cargo test --workspace --exclude rthstrack-live --locked --test fuzz 2>&1 | tee $(OUT)/fuzz.log
 	@RTHSTRACK_FUZZ=1000000 cargo test --package rthstrack-live --locked --test fuzz 2>&1 | tee -a $(OUT)/fuzz.log
 	@$(call ran_some,$(OUT)/fuzz.log)
-	@RTHSTRACK_FUZZ=5000 $(BIN)/pytest tests/test_readers_damage.py
+	@RTHSTRACK_FUZZ=5000 RTHSTRACK_FUZZ_OWN=200000 $(BIN)/pytest tests/test_readers_damage.py tests/test_tdm.py
 
 .PHONY: test-peers
 test-peers: $(PEERS)/ready .venv/built ## virtual tests beside OpenSees; downloads openseespy into an environment of its own

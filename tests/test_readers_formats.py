@@ -208,7 +208,57 @@ def test_the_ground_motions_of_the_benchmark_are_read(shared: Path) -> None:
         assert "it has no name, but rises evenly" in recording.rate_source
 
 
+def mat5(path: Path, order: str, *variables: tuple[str, Any, bool]) -> Path:
+    """A MATLAB v5 file in this byte order by its published form: (name, values, sparse) of double columns."""
+
+    def element(kind: int, data: bytes) -> bytes:
+        return struct.pack(f"{order}2I", kind, len(data)) + data + bytes(-len(data) % 8)
+
+    def numbers(kind: int, values: Any, code: str) -> bytes:
+        return element(kind, np.asarray(values, f"{order}{code}").tobytes())
+
+    head = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack(f"{order}H", 0x0100) + (b"MI" if order == ">" else b"IM")
+    content = head
+    for name, values, sparse in variables:
+        at = np.flatnonzero(values)
+        parts = numbers(6, [5 if sparse else 6, len(at)], "u4") + numbers(5, [len(values), 1], "i4")
+        parts += element(1, name.encode())
+        parts += numbers(5, at, "i4") + numbers(5, [0, len(at)], "i4") if sparse else b""
+        content += element(14, parts + numbers(9, values[at] if sparse else values, "f8"))
+    path.write_bytes(content)
+    return path
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_a_sparse_matrix_is_named_and_the_rest_is_read(tmp_path: Path, order: str) -> None:
+    stiffness = np.eye(5).ravel()
+    file = mat5(tmp_path / "a.mat", order, ("x", TARGET, False), ("K", stiffness, True), ("y", MEASURED, False))
+    recording = read_recording(file)
+    assert np.array_equal(recording["x"].values, TARGET)
+    assert np.array_equal(recording["y"].values, MEASURED)
+    assert "'K' is a sparse matrix (save what full() makes of it), no channel" in recording.notes
+    with pytest.raises(RecordingError, match=r"no channels.*'x' is a sparse matrix \(save what full\(\) makes of it\)"):
+        read_recording(mat5(tmp_path / "b.mat", order, ("x", TARGET, True)))
+
+
 # ---- MATLAB v7.3 ----
+
+
+def test_a_simulink_log_whose_samples_are_a_stream_is_named_with_what_to_export(tmp_path: Path) -> None:
+    def build(file: h5py.File) -> None:
+        # As Simulink logs to a file: the samples as bytes apart, and an object that says whose they are.
+        stream = file.create_group("#sigstream#/0")
+        stream["#data#"] = np.frombuffer(TARGET.tobytes(), np.uint8)
+        stream["#length#"], stream["#sampleSize#"] = [len(TARGET)], [8]
+        log = file.create_dataset("logsout", data=np.array([[0xDD000000, 2, 1, 1, 1, 1]], dtype=np.uint32))
+        log.attrs["MATLAB_class"] = np.bytes_("Simulink.SimulationData.Dataset")
+        log.attrs["MATLAB_object_decode"] = np.int32(3)
+
+    with pytest.raises(RecordingError) as caught:
+        read_recording(v73(tmp_path / "a.mat", build))
+    said = str(caught.value)
+    assert "'logsout' is a MATLAB object (Simulink.SimulationData.Dataset)" in said
+    assert "save logsout{1}.Values.Time and logsout{1}.Values.Data" in said
 
 
 def v73(path: Path, build: Any) -> Path:
@@ -396,7 +446,7 @@ def test_tdms_channels_have_group_unit_and_increment(tmp_path: Path) -> None:
     recording = read_recording(path)
     assert listed(recording) == [("Target", "DAQ/Target", "mm", 100), ("Measured", "DAQ/Measured", "mm", 100)]
     assert np.array_equal(recording["DAQ/measured"].values, (MEASURED * 1000).astype(np.int16).astype(float))
-    assert (recording.rate_hz, recording.rate_source) == (50.0, "TDMS wf_increment")
+    assert (recording.rate_hz, recording.rate_source) == (50.0, "wf_increment")
     assert "'Log/Events' holds no numbers, no channel" in recording.notes
 
 
@@ -405,7 +455,7 @@ def test_tdms_channels_of_different_increments_leave_the_rate_open(tmp_path: Pat
     recording = read_recording(path)
     assert recording.rate_hz is None
     assert recording.rate_source == (
-        "the channels have different sampling rates (TDMS wf_increment: 1 Hz for 'b/y', 50 Hz for 'a/x')"
+        "the channels have different sampling rates (wf_increment: 1 Hz for 'b/y', 50 Hz for 'a/x')"
     )
 
 

@@ -543,11 +543,19 @@ def test_likely_pairs_are_found_by_name(names: list[str], pairs: list[tuple[str,
 def test_two_like_channels_without_telling_names_are_a_guess_and_said_so() -> None:
     rng = np.random.default_rng(1)
     target = np.convolve(rng.standard_normal(4000), np.hanning(50), "same")
-    channels = [("CHANNEL0", 0.9 * np.roll(target, 20)), ("CHANNEL1", rng.standard_normal(4000)), ("CHANNEL2", target)]
-    made = tuple(Channel(name, name, None, values) for name, values in channels)
-    pairs, why = propose_pair(Recording("file.csv", "made", made, 1000.0, "--rate", 0.0, ()))
-    assert pairs == [("CHANNEL2", "CHANNEL0")]
-    assert why.startswith("a guess, for no name tells: 'CHANNEL0' follows 'CHANNEL2' 20 samples later (correlation ")
+    late = 0.9 * np.roll(target, 20)
+
+    def recording(first: np.ndarray, last: np.ndarray) -> Recording:
+        channels = [("CHANNEL0", first), ("CHANNEL1", rng.standard_normal(4000)), ("CHANNEL2", last)]
+        made = tuple(Channel(name, name, None, values) for name, values in channels)
+        return Recording("file.csv", "made", made, 1000.0, "--rate", 0.0, ())
+
+    pairs, why = propose_pair(recording(target, late))
+    assert pairs == [("CHANNEL0", "CHANNEL2")]
+    assert why.startswith("a guess, for no name tells: 'CHANNEL2' follows 'CHANNEL0' 20 samples later (correlation ")
+    assert why.code == "pair_guessed"
+    with pytest.raises(ChannelError, match=r"'CHANNEL0' and 'CHANNEL2' move alike .* which is target cannot be told"):
+        propose_pair(recording(late, target))
 
 
 @pytest.mark.parametrize(
@@ -567,9 +575,9 @@ def test_where_nothing_is_likely_nothing_is_proposed(make: Callable[[], Recordin
 
 
 def test_the_records_of_the_machine_have_the_pair_that_is_known(shared: Path) -> None:
-    pairs, why = propose_pair(read_recording(shared / "records" / "utfsm_15Hz_0A.txt"))
-    assert pairs == [("CHANNEL2", "CHANNEL0")]
-    assert "a guess" in why
+    # Measured comes first there: nothing but who leads says which is target.
+    with pytest.raises(ChannelError, match=r"'CHANNEL0' and 'CHANNEL2' move alike .* which is target cannot be told"):
+        propose_pair(read_recording(shared / "records" / "utfsm_15Hz_0A.txt"))
     assert propose_pair(read_recording(shared / "records" / "utfsm_chirp_0A.csv"))[0] == [("cmd_mm", "meas_mm")]
 
 

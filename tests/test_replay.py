@@ -174,6 +174,23 @@ def test_a_run_of_simulate_is_replayed_without_flags(
     np.testing.assert_array_equal(samples[:, 2], made.measured)
 
 
+def test_two_files_are_sent_on_the_clock_they_have_in_common(
+    capsys: pytest.CaptureFixture[str], recorded: Path, listener: Listener
+) -> None:
+    t = np.arange(N) / RATE
+    other = recorded.with_name("daq.csv")
+    np.savetxt(other, np.column_stack([t + 0.1, MEASURED]), delimiter=",", header="time,xm", comments="")
+    first = recorded.with_name("control.csv")
+    np.savetxt(first, np.column_stack([t, TARGET]), delimiter=",", header="time,xt", comments="")
+    to = ("--to", f"udp://127.0.0.1:{listener.port}")
+    status, err = run(capsys, *to, "--target", f"{first}:xt", "--measured", f"{other}:xm", "--speed", "10")
+    assert status == 0, err
+    samples = np.array([struct.unpack("<3d", datagram) for datagram in listener.close()])
+    later = round(0.1 * RATE)
+    np.testing.assert_array_equal(samples[:, 1], TARGET[later:])
+    np.testing.assert_array_equal(samples[:, 2], MEASURED[: N - later])
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_a_loop_cleanly_and_its_counter_goes_on(
     recorded: Path, listener: Listener, number: signal.Signals
@@ -223,6 +240,15 @@ def test_nobody_listening_is_told_and_no_error(capsys: pytest.CaptureFixture[str
     status, err = run(capsys, recorded, "--to", f"udp://127.0.0.1:{port}", "--speed", 20)
     assert status == 0
     assert re.search(r"; \d+ datagrams found nobody listening$", err[-1])
+
+
+def test_a_folder_is_refused(capsys: pytest.CaptureFixture[str], recorded: Path) -> None:
+    status, err = run(capsys, recorded.parent, "--to", "udp://127.0.0.1:5005")
+    assert status == 1
+    assert err == [f"rthstrack: {recorded.parent}: a folder; one test is sent at a time; name one of its files"]
+    status, err = run(capsys, "--to", "udp://127.0.0.1:5005")
+    assert status == 2
+    assert "required: FILE" in err[-1]
 
 
 @pytest.mark.parametrize(

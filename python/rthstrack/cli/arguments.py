@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rthstrack.errors import RthstrackError
+    from rthstrack.recording.chosen import ChosenPairs
 
 
 def add_signals(parser: argparse.ArgumentParser, title: str) -> argparse._ArgumentGroup:
@@ -41,6 +42,9 @@ def add_signals(parser: argparse.ArgumentParser, title: str) -> argparse._Argume
     signals.add_argument("--end", type=seconds, metavar="S", help="leave out what comes after, in seconds")
     signals.add_argument("--fill", type=count, metavar="SAMPLES", help="interpolate gaps of up to so many samples")
     signals.add_argument("--resample", type=hertz, metavar="HZ", help="interpolate uneven time stamps onto this rate")
+    signals.add_argument(
+        "--align", action="store_true", help="two files without a common clock: align them by correlation"
+    )
     add_part(signals)
     return signals
 
@@ -51,9 +55,47 @@ def files_in(paths: Sequence[str]) -> list[str]:
     for path in paths:
         inside = sorted(Path(path).iterdir()) if Path(path).is_dir() else []
         inside = [one for one in inside if one.is_file() and not one.name.startswith(".")]
-        # LabVIEW's index beside a TDMS file is no recording.
-        found += [str(one) for one in inside if one.suffix != ".tdms_index"] or [path]
+        # LabVIEW's index beside a TDMS file is no recording, and the numbers beside a TDM file are read with it.
+        found += [str(one) for one in inside if one.suffix.lower() not in (".tdms_index", ".tdx")] or [path]
     return found
+
+
+def two_files(
+    args: argparse.Namespace, files: Sequence[str], misuse: Callable[[str], Any], what: str = "FILE"
+) -> list[tuple[str, str]] | None:
+    """(file, channel) of target and of measured where these name files themselves; None where `files` are named."""
+    if files:
+        if args.align:
+            misuse(f"--align speaks of two files: --target FILE:CHANNEL --measured FILE:CHANNEL, and no other {what}")
+        return None
+    named = [*(args.target or []), *(args.measured or [])]
+    if not named:
+        misuse(f"the following arguments are required: {what}")
+    found = []
+    for text in named:
+        places = [i for i, c in enumerate(text) if c == ":" and i and Path(text[:i]).is_file() and text[i + 1 :]]
+        if not places:
+            misuse(f"without a {what} expected --target FILE:CHANNEL and --measured FILE:CHANNEL, found '{text}'")
+        else:
+            found.append((text[: places[-1]], text[places[-1] + 1 :]))
+    if len(args.target or []) != 1 or len(args.measured or []) != 1 or getattr(args, "command", None):
+        misuse("of two files one --target and one --measured are taken, and no --command")
+    return found
+
+
+def together(two: Sequence[tuple[str, str]]) -> str:
+    """What two files are called as one."""
+    return " and ".join(file for file, _ in two)
+
+
+def read_signals(args: argparse.Namespace, file: str, commands: Sequence[str] = ()) -> ChosenPairs:
+    """The channels that `add_signals` asks for: of `file`, or of the two files of `args.two`."""
+    from rthstrack.recording.chosen import read_chosen, read_two
+
+    asked = chosen(args)
+    if args.two is None:
+        return read_chosen(file, **asked, commands=commands)
+    return read_two(*args.two, align=args.align, **{k: v for k, v in asked.items() if k not in ("targets", "measured")})
 
 
 def add_part(parser: argparse._ActionsContainer) -> None:
@@ -91,6 +133,8 @@ OPTIONS = {
     "fill": "--fill SAMPLES",
     "filled(SAMPLES)": "--fill SAMPLES",
     "unit": "--unit",
+    "channel": "--channel NAME",
+    "layout": "--layout",
     "align": "--align",
     "start_s": "--start S",
     "end_s": "--end S",

@@ -66,6 +66,7 @@ def _listing(file: str, block: int | None, lines: tuple[int, int] | None) -> dic
         problem = told(error, with_file=False)
         recording = recording_from(contents, file, rate_hz=1.0)
         recording = Recording(file, recording.format, recording.channels, None, problem, 0.0, contents.notes)
+    why: str
     try:
         pairs, why = propose_pair(recording)
     except ChannelError as error:

@@ -9,7 +9,17 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rthstrack.cli.arguments import add_method, add_signals, chosen, files_in, path, told, tolerance
+from rthstrack.cli.arguments import (
+    add_method,
+    add_signals,
+    files_in,
+    path,
+    read_signals,
+    together,
+    told,
+    tolerance,
+    two_files,
+)
 from rthstrack.cli.commands import COMMANDS
 from rthstrack.cli.evaluate_tables import write_tables
 from rthstrack.cli.evaluate_text import SORTED_BY, print_text
@@ -20,7 +30,6 @@ from rthstrack.errors import RecordingError, RthstrackError, SettingError
 from rthstrack.evaluation.factors import TOLERANCE
 from rthstrack.evaluation.results import json_ready
 from rthstrack.evaluation.tracking import Evaluator
-from rthstrack.recording.chosen import read_chosen, read_two
 from rthstrack.recording.readers import FORMAT_NAMES
 from rthstrack.recording.recording import Recording
 from rthstrack.verdict.assessment import trusted_settings, without_trusted
@@ -33,6 +42,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from rthstrack.evaluation.settings import Settings
+    from rthstrack.said import Said
     from rthstrack.verdict.assessment import Assessment
 
 FAILED, EXCEEDED = 1, 3
@@ -55,9 +65,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "none where --target and --measured are each FILE:CHANNEL"
     )  # fmt: skip
     signals = add_signals(parser, "signals (a channel is named by name, path or #index)")
-    signals.add_argument(
-        "--align", action="store_true", help="two files without a common clock: align them by correlation"
-    )
     signals.add_argument("--command", action="append", metavar="C", help="what compensation sends: judged apart")
     method = add_method(parser, trusted=True)
     for option in setting_options("evaluation"):
@@ -97,8 +104,8 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
         settle(args)
     except SettingError as impossible:
         misuse(told(impossible))
-    args.two = _two_files(args, misuse)
-    args.files = files_in(args.files) if args.two is None else [" and ".join(file for file, _ in args.two)]
+    args.two = two_files(args, args.files, misuse)
+    args.files = files_in(args.files) if args.two is None else [together(args.two)]
     _check(args, misuse)
     results, failures = _evaluate_all(args)
     assessments = [a for found in results for a in found]
@@ -128,11 +135,7 @@ def assess_file(file: str, args: argparse.Namespace) -> list[Assessment]:
 
     Raises RecordingError, ChannelError or SignalError, with the file and the channels named.
     """
-    if args.two is not None:
-        named = {key: value for key, value in chosen(args).items() if key not in ("targets", "measured")}
-        recording, _, pairs, proposal = read_two(*args.two, align=args.align, **named)
-    else:
-        recording, _, pairs, proposal = read_chosen(file, **chosen(args), commands=args.command or ())
+    recording, _, pairs, proposal = read_signals(args, file, args.command or ())
     commands: Sequence[str | None] = args.command or [None] * len(pairs)
     if len(commands) != len(pairs):
         raise RecordingError(
@@ -154,7 +157,7 @@ def _assess(
     part: str,
     target: str,
     measured: str,
-    proposal: str | None,
+    proposal: Said | None,
     args: argparse.Namespace,
 ) -> Assessment:
     asked, answered = recording.channel(target), recording.channel(measured)
@@ -186,27 +189,6 @@ def _assess(
 
 def _limits(args: argparse.Namespace) -> Limits:
     return Limits(args.limit_delay, args.limit_amplitude, args.critical_delay, args.critical_fraction or 1.0)
-
-
-def _two_files(args: argparse.Namespace, misuse: Callable[[str], Any]) -> list[tuple[str, str]] | None:
-    """(file, channel) of target and of measured where these name files themselves; None where files are named."""
-    if args.files:
-        if args.align:
-            misuse("--align speaks of two files: --target FILE:CHANNEL --measured FILE:CHANNEL, and no other FILE")
-        return None
-    named = [*(args.target or []), *(args.measured or [])]
-    if not named:
-        misuse("the following arguments are required: FILE")
-    found = []
-    for text in named:
-        places = [i for i, c in enumerate(text) if c == ":" and i and Path(text[:i]).is_file() and text[i + 1 :]]
-        if not places:
-            misuse(f"without a FILE expected --target FILE:CHANNEL and --measured FILE:CHANNEL, found '{text}'")
-        else:
-            found.append((text[: places[-1]], text[places[-1] + 1 :]))
-    if len(args.target or []) != 1 or len(args.measured or []) != 1 or args.command:
-        misuse("of two files one --target and one --measured are judged, and no --command")
-    return found
 
 
 def _check(args: argparse.Namespace, misuse: Callable[[str], Any]) -> None:

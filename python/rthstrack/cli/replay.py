@@ -7,18 +7,18 @@ import contextlib
 import socket
 import time
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rthstrack.cli import addresses
-from rthstrack.cli.arguments import add_signals, chosen, count, told
+from rthstrack.cli.arguments import add_signals, count, read_signals, together, told, two_files
 from rthstrack.cli.commands import COMMANDS
 from rthstrack.cli.quantities import positive
 from rthstrack.cli.running import Ended, say
 from rthstrack.errors import RecordingError, RthstrackError, SettingError
 from rthstrack.live.layout import DatagramLayout, default_layout, read_layout
-from rthstrack.recording.chosen import read_chosen
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -44,7 +44,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "Exit status: 0 sent (SIGINT and SIGTERM end it too), 1 the file cannot be read or nothing can be sent, "
         "2 misuse or a mistake in the layout.",
     )
-    parser.add_argument("file", metavar="FILE", help="recorded test or run file of 'rthstrack simulate'")
+    parser.add_argument("file", nargs="?", metavar="FILE", help="recorded test or run file of 'rthstrack simulate'; "
+                        "none where --target and --measured are each FILE:CHANNEL")  # fmt: skip
     parser.add_argument("--to", type=addresses.udp, required=True, metavar="udp://HOST:PORT", help="where to")
     parser.add_argument("--speed", type=positive, default=1.0, metavar="X", help="times as fast as recorded (1)")
     parser.add_argument(
@@ -58,6 +59,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
     """Sends the file; returns the exit status."""
+    args.two = two_files(args, [args.file] if args.file else [], misuse)
+    if args.two is not None:
+        args.file = together(args.two)
+    elif Path(args.file).is_dir():
+        raise RecordingError("a folder; one test is sent at a time", file=args.file, advice="name one of its files")
     if len(args.target or []) != len(args.measured or []):
         misuse(f"--target and --measured go in pairs, found {len(args.target or [])} and {len(args.measured or [])}")
     if args.resample and args.rate:
@@ -99,7 +105,7 @@ class _Signals:
 
 def _read(args: argparse.Namespace) -> tuple[str, _Signals]:
     """What is sent, and in words which channels it is."""
-    recording, rate_hz, pairs, _ = read_chosen(args.file, **chosen(args))
+    recording, rate_hz, pairs, _ = read_signals(args, args.file)
     channels = [(recording.channel(target), recording.channel(measured)) for target, measured in pairs]
     lengths = {one.name: len(one.values) for pair in channels for one in pair}
     if len(set(lengths.values())) > 1:

@@ -5,13 +5,17 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rthstrack.cli.commands import COMMANDS
 from rthstrack.cli.progress import stages
+from rthstrack.cli.quantities import hertz
 from rthstrack.errors import SettingError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rthstrack.ground_motion import GroundMotion
     from rthstrack.reproduction import Reproduction
 
 _DESCRIPTION = """\
@@ -28,6 +32,8 @@ _EPILOG = """\
 examples:
   rthstrack reproduce -o paper
   rthstrack reproduce -o paper --record MU2035=NORTHR_MU2035.AT2
+
+  rthstrack reproduce -o paper --record CANOGA=canoga.txt --layout values --rate 100 --unit g
 
 Files of the same names in DIR are overwritten, no others.
 Exit status: 0 done, 1 a record cannot be had or read, or a file not be written, 2 misuse.
@@ -47,6 +53,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--record", action="append", type=_record, default=[], metavar="NAME=FILE",
                         help="ground motion for CHY101-N, MU2035 or CANOGA: PEER AT2, or text, MAT, ...")  # fmt: skip
+    how = parser.add_argument_group("how these files are read", "Each for all of them, or with NAME= for one.")
+    how.add_argument("--layout", action="append", type=_of(_layout), default=[], metavar="[NAME=]LAYOUT",
+                     help="channels (default), or values: one record, line after line, without a time")  # fmt: skip
+    how.add_argument("--rate", action="append", type=_of(hertz), default=[], metavar="[NAME=]HZ",
+                     help="sampling rate, before the file's own")  # fmt: skip
+    how.add_argument("--unit", action="append", type=_of(_unit), default=[], metavar="[NAME=]UNIT",
+                     help="g, gal, cm/s2, m/s2, mm/s2, in/s2 or ft/s2, before the file's own")  # fmt: skip
+    how.add_argument("--channel", action="append", type=_of(str), default=[], metavar="[NAME=]CHANNEL",
+                     help="of a file with several: name, path or #index")  # fmt: skip
     parser.set_defaults(run=run)
 
 
@@ -54,15 +69,58 @@ def run(args: argparse.Namespace) -> int:
     """Reproduces the study; returns the exit status."""
     from rthstrack.reproduction import reproduce
 
-    given: dict[str, Path] = {}
-    for name, file in args.record:
-        if name in given:
-            raise SettingError(f"--record {name} is given twice; give every record once")
-        given[name] = file
+    given = _motions(args)
     with stages() as progress:
         result = reproduce(args.output, records=given, progress=progress)
     _print_text(result, args.output)
     return 0
+
+
+def _motions(args: argparse.Namespace) -> dict[str, GroundMotion]:
+    """The records that are given as files."""
+    from rthstrack.ground_motion import read_ground_motion
+    from rthstrack.reproduction.cases import checked_name
+
+    files: dict[str, Path] = {}
+    for name, file in args.record:
+        checked_name(name)
+        if name in files:
+            raise SettingError(f"--record {name} is given twice; give every record once")
+        files[name] = file
+    options: dict[str, dict[str, Any]] = {name: {} for name in files}
+    for option, key in (("layout", "layout"), ("rate", "rate_hz"), ("unit", "unit"), ("channel", "channel")):
+        # What is said of one record goes before what is said of all.
+        for name, value in sorted(getattr(args, option), key=lambda one: one[0] or ""):
+            if not files or (name and name not in files):
+                of = f" {name}" if name else ""
+                raise SettingError(f"--{option} speaks of a file that is not given; give --record{of or ' NAME'}=FILE")
+            for one in (name,) if name else files:
+                options[one][key] = value
+    return {name: read_ground_motion(file, **options[name]) for name, file in files.items()}
+
+
+def _of(kind: Callable[[str], Any]) -> Callable[[str], tuple[str | None, Any]]:
+    """An option's value, of all records or of one: VALUE or NAME=VALUE."""
+
+    def check(text: str) -> tuple[str | None, Any]:
+        name, equals, value = text.rpartition("=")
+        return (name if equals else None), kind(value)
+
+    return check
+
+
+def _layout(text: str) -> str:
+    if text not in ("channels", "values"):
+        raise argparse.ArgumentTypeError(f"expected channels or values, found '{text}'")
+    return text
+
+
+def _unit(text: str) -> str:
+    from rthstrack.ground_motion.files import ACCELERATION
+
+    if ACCELERATION.unit(text) is None:
+        raise argparse.ArgumentTypeError(f"expected a unit of acceleration ({ACCELERATION.unit_names}), found '{text}'")
+    return text
 
 
 def _record(text: str) -> tuple[str, Path]:

@@ -12,7 +12,18 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rthstrack.cli.arguments import add_method, add_signals, chosen, count, told, tolerance
+from rthstrack.cli.arguments import (
+    add_method,
+    add_signals,
+    chosen,
+    count,
+    files_in,
+    read_signals,
+    together,
+    told,
+    tolerance,
+    two_files,
+)
 from rthstrack.cli.commands import COMMANDS
 from rthstrack.cli.progress import counted, stage
 from rthstrack.cli.quantities import positive, time
@@ -25,7 +36,7 @@ from rthstrack.evaluation.settings import StudyMethod
 from rthstrack.recording.readers import FORMAT_NAMES
 from rthstrack.studies.cells import Study
 from rthstrack.studies.grid import study
-from rthstrack.studies.pairs import Pair, read_pairs
+from rthstrack.studies.pairs import Pair, pairs_in, read_pairs
 from rthstrack.studies.settings import COMBINED, POWERS, WEIGHT_POWERS, WINDOWS, StudySettings, _several
 
 if TYPE_CHECKING:
@@ -74,7 +85,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         description=_DESCRIPTION,
         epilog=_EPILOG,
     )
-    parser.add_argument("sources", nargs="+", metavar="SOURCE", help="recorded test, run file or configuration (.toml)")
+    parser.add_argument("sources", nargs="*", metavar="SOURCE",
+                        help="recorded test, run file or configuration (.toml), or a folder of them; none where "
+                        "--target and --measured are each FILE:CHANNEL")  # fmt: skip
     grid = parser.add_argument_group("grid (lists with commas)")
     powers = f"{POWERS[0]},{POWERS[1]},...,{POWERS[-1]}"
     grid.add_argument(
@@ -129,6 +142,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
     """Studies the sources; returns the exit status."""
     _take_preset(args)
+    args.two = two_files(args, args.sources, misuse, "SOURCE")
     if len(args.target or []) != len(args.measured or []):
         misuse(f"--target and --measured go in pairs, found {len(args.target or [])} and {len(args.measured or [])}")
     if args.resample and args.rate:
@@ -233,7 +247,7 @@ def _read_all(args: argparse.Namespace) -> tuple[list[Pair], list[tuple[str, str
 
     def one(file: str) -> list[Pair] | str:
         try:
-            return read_pairs(file, **chosen(args))
+            return read_pairs(file, **chosen(args)) if args.two is None else pairs_in(read_signals(args, file), file)
         except RthstrackError as error:
             return told(error.about(file))
         except MemoryError:
@@ -241,7 +255,7 @@ def _read_all(args: argparse.Namespace) -> tuple[list[Pair], list[tuple[str, str
 
     pairs: list[Pair] = []
     failures = []
-    files = list(dict.fromkeys(args.sources))
+    files = list(dict.fromkeys(files_in(args.sources))) if args.two is None else [together(args.two)]
     with ThreadPoolExecutor(max_workers=min(len(files), os.cpu_count() or 1)) as pool:
         for file, outcome in zip(files, counted("reading", pool.map(one, files), len(files)), strict=True):
             if isinstance(outcome, str):

@@ -46,7 +46,7 @@ def read_ground_motion(
             file=file,
             code="implausible_peak",
             values=(peak,),
-            advice="give unit",
+            advice="give {unit}",
         )
     try:
         return GroundMotion(Path(path).stem, read.values, read.rate_hz, read.source, read.notes)

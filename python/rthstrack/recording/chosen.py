@@ -34,7 +34,7 @@ class ChosenPairs(NamedTuple):
     recording: Recording
     rate_hz: float
     pairs: list[tuple[str, str]]
-    proposal: str | None
+    proposal: Said | None
 
 
 def read_chosen(
@@ -175,7 +175,7 @@ def read_two(
         both = both.filled(fill)
     if align:
         both = _aligned(both)
-    elif "" in (asked_from, answered_from) or asked_from != answered_from:
+    elif {"", "rate"} & {asked_from, answered_from} or asked_from != answered_from:
         counted = ((target[0], asked_from), (measured[0], answered_from))
         told = " and ".join(f"{name} {_COUNTS[counts]}" for name, counts in counted)
         raise RecordingError(
@@ -200,6 +200,7 @@ def read_two(
 #: What a file's time counts from, in words.
 _COUNTS = {
     "": "has no time column",
+    "rate": "is read at the rate that was given",
     "seconds": "counts seconds",
     "epoch": "counts seconds since 1970",
     "dates": "has dates",
@@ -209,7 +210,9 @@ _COUNTS = {
 
 def _counts_from(contents: Contents, recording: Recording, *, given: bool) -> tuple[str, int]:
     """From when a file counts its time (a key of `_COUNTS`), and its first entry in ns if that is a date."""
-    columns = [] if given else time_columns(contents, None, recording.file)
+    if given:
+        return "rate", 0
+    columns = time_columns(contents, None, recording.file)
     if any(not column.is_clock for column in columns):
         return ("epoch" if recording.start_s > _YEAR_S else "seconds"), 0
     first = contents.clocks[0].first_ns if columns else None

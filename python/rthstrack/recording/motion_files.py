@@ -81,11 +81,13 @@ def read_motion(
         rate, own_unit, what = recording.rate_hz, chosen.unit, f"channel '{chosen.path}'"
         unknown = recording.rate_source
     if rate is None:
-        raise RecordingError(f"sampling rate not known: {unknown}; give rate_hz", file=file)
+        raise RecordingError(f"sampling rate not known: {unknown}", file=file, advice="give {rate_hz}")
     given = unit or own_unit
     if given is None:
         raise RecordingError(
-            f"{what}: the file does not say its unit; give unit, one of {quantity.unit_names}", file=file
+            f"{what}: the file does not say its unit",
+            file=file,
+            advice=f"give {{unit}}, one of {quantity.unit_names}",
         )
     known = quantity.unit(given)
     if known is None:
@@ -152,5 +154,5 @@ def _likely_channel(recording: Recording, quantity: Quantity) -> Channel:
     if not left:
         said = f"no channel that may be {article} {quantity.name}"
     nameless = left and all(c.name.startswith("column ") for c in left)
-    hint = "; if it is one record, several values a line, the layout is 'values'" if nameless else ""
-    raise ChannelError(f"{said}; choose one with channel{hint}", file=recording.file)
+    hint = "; if it is one record, several values a line, the {layout} is 'values'" if nameless else ""
+    raise ChannelError(said, file=recording.file, advice=f"choose one with {{channel}}{hint}")

@@ -9,17 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rthstrack.errors import ChannelError, RecordingError
-from rthstrack.recording.clocks import on_one_clock
+from rthstrack.errors import ChannelError
 from rthstrack.recording.copies import is_copy
+from rthstrack.recording.likeness import LIKENESS, MOST_SAMPLES, Likeness, likeness, rate_of
 from rthstrack.recording.names import FILLERS, GENERIC, quantities, role, words
+from rthstrack.said import Said
 from rthstrack.units import length_factor, split_unit
 from rthstrack.units import quantity as unit_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from numpy.typing import NDArray
 
     from rthstrack.recording.recording import Channel, Recording
 
@@ -33,37 +32,40 @@ _BY_UNIT = {
     "voltage": "voltage",
     "current": "voltage",
 }
-# What a guess by likeness needs: correlation, lag, gain, and how much of the record is looked at.
-_LIKENESS = 0.9
-_LONGEST_LAG_S = 0.25
-_MOST_SAMPLES = 1 << 16
+# A guess by likeness compares no more channels than this.
 _MOST_CHANNELS = 16
-# An actuator that is left to itself loses so much that the gain is this or less.
-_LOSS = 0.92
+# A later channel that is larger than the earlier by more than this is hardly what follows it.
+_MOST_GAIN = 1.09
+_INPUT = {"input", "in"}
 _CHOOSE = "choose: {target}, {measured}"
 _NAME = "name them: {target}, {measured}"
 
 
 @dataclass(frozen=True, slots=True)
 class _Named:
-    """A channel with what its name says: role (target or measured), rank of the word, quantity, and what is left."""
+    """A channel with what its name says: role (target or measured), rank of the word, quantity, and what is left.
+
+    The quantity may be known by the unit alone, or by a word.
+    """
 
     index: int
     role: str | None
     rank: int
     quantity: str | None
+    by_word: bool
     rest: tuple[str, ...]
 
 
 @np.errstate(all="ignore")  # infinite samples are told where they matter
-def propose_pair(recording: Recording) -> tuple[list[tuple[str, str]], str]:
+def propose_pair(recording: Recording) -> tuple[list[tuple[str, str]], Said]:
     """Likely (target, measured) channels, one pair per actuator, and one sentence that says why.
 
     The channels are given by what selects them: the path, or `#index` where the path is not unique. Names decide
     (target, command, reference, ... and measured, feedback, actual, ...; in several languages), first those of the
-    channels, then of what they stand in; where no name tells, two channels that move alike with a small lag are a
-    guess, and the sentence says so. Exact copies are no pair. Raises ChannelError if nothing is likely, or if several
-    fit.
+    channels, then of what they stand in; a channel named like target goes with the only other one of its kind that
+    moves like it. Where no name tells, two channels that move alike in the order of target and measured are a guess,
+    and the sentence says so (its code is `pair_guessed`). Exact copies are no pair. Raises ChannelError if nothing is
+    likely, or if several fit.
     """
     channels = recording.channels
     judged = [i for i, c in enumerate(channels) if not c.is_time]
@@ -74,17 +76,23 @@ def propose_pair(recording: Recording) -> tuple[list[tuple[str, str]], str]:
         if of_role > 1 and not {"target", "measured"} <= {one.role for one in named}:
             continue
         try:
-            pairs = _by_name(named, channels, recording.file, copies)
+            pairs = _by_name(named, recording, copies)
         except ChannelError as error:
             several = several or error
             continue
         if pairs:
             shown = " and ".join(f"'{channels[t].name}' and '{channels[m].name}'" for t, m in pairs[:3])
             shown += ", ..." if len(pairs) > 3 else ""
-            why = f"{shown} are named like target and measured"
+            why = Said(f"{shown} are named like target and measured", "pair_named")
             return [(_selector(channels, t), _selector(channels, m)) for t, m in pairs], why
     if several is not None:
         raise several
+    for of_role in (1, 2, 3):
+        pairs = _by_targets_name([_read_name(i, channels[i], of_role, 9) for i in judged], recording)
+        if pairs:
+            shown = " and ".join(f"only '{channels[m].name}' moves like '{channels[t].name}'" for t, m in pairs[:3])
+            why = Said(f"{shown}, named like target", "pair_half_named")
+            return [(_selector(channels, t), _selector(channels, m)) for t, m in pairs], why
     if copies:
         raise ChannelError(
             f"no likely target/measured pair: {'; '.join(dict.fromkeys(copies))}",
@@ -141,17 +149,21 @@ def _read_name(index: int, channel: Channel, of_role: int, of_rest: int) -> _Nam
     told = {kind for _, kind in kinds}
     # An error of displacement is no displacement.
     kind = "other" if "other" in told else (kinds[0][1] if kinds else None)
-    kind = kind if kind == "other" else _BY_UNIT.get(unit_quantity(channel.unit) or "") or kind
+    by_unit = _BY_UNIT.get(unit_quantity(channel.unit) or "")
+    # A load cell in volts is one of force.
+    kind = kind if kind == "other" or (kind and by_unit == "voltage") else by_unit or kind
     used = {at, *(i for i, _ in kinds)}
-    return _Named(index, found.name, found.rank, kind, tuple(word for i, word in enumerate(text) if i not in used))
+    rest = tuple(word for i, word in enumerate(text) if i not in used)
+    return _Named(index, found.name, found.rank, kind, bool(kinds), rest)
 
 
 def _parts(path: str) -> list[str]:
     return [part for part in re.split(r"[/.](?=[^\W\d])", path) if part] or [path]
 
 
-def _by_name(named: list[_Named], channels: tuple[Channel, ...], file: str, copies: list[str]) -> list[tuple[int, int]]:
+def _by_name(named: list[_Named], recording: Recording, copies: list[str]) -> list[tuple[int, int]]:
     """Pairs by name, of one quantity and length: displacement where there is any, else what there is."""
+    channels = recording.channels
     for wanted in (
         ("displacement", None),
         ("force",),
@@ -176,9 +188,9 @@ def _by_name(named: list[_Named], channels: tuple[Channel, ...], file: str, copi
         if not measured:
             continue
         pairs = _matched(targets, measured)
-        if not pairs:
-            listed = ", ".join(f"'{channels[one.index].name}'" for one in (*targets, *measured))
-            raise ChannelError(f"several channels could be target or measured: {listed}", file=file, advice=_CHOOSE)
+        rivals = _rivals(pairs, named, recording)
+        if not pairs or rivals:
+            raise _several((*targets, *measured, *rivals), channels, recording.file)
         return [(t, m) for t, m in pairs if len(channels[t].values) == len(channels[m].values)] or pairs
     return []
 
@@ -197,6 +209,91 @@ def _bare(targets: list[_Named], named: list[_Named], channels: tuple[Channel, .
             for target in targets
         )
     ]
+
+
+def _several(found: Sequence[_Named], channels: tuple[Channel, ...], file: str) -> ChannelError:
+    listed = ", ".join(f"'{channels[one.index].name}'" for one in found)
+    return ChannelError(f"several channels could be target or measured: {listed}", file=file, advice=_CHOOSE)
+
+
+def _own(one: _Named) -> set[str]:
+    """The words that say which of several alike a channel is."""
+    return set(one.rest) - FILLERS
+
+
+def _of_one_kind(target: _Named, one: _Named, channels: tuple[Channel, ...]) -> bool:
+    """Whether what a channel says of quantity and unit leaves it the same as target's."""
+    a, b = channels[target.index].unit, channels[one.index].unit
+    return (target.quantity is None or one.quantity in (None, target.quantity)) and (a is None or b is None or a == b)
+
+
+def _alike(recording: Recording, a: int, b: int) -> bool:
+    found = likeness(recording, a, b)
+    return found is not None and found.correlation >= LIKENESS
+
+
+def _rivals(pairs: list[tuple[int, int]], named: list[_Named], recording: Recording) -> list[_Named]:
+    """Channels without a role that by name and motion may be measured as well as the one that was found.
+
+    A controller calls what it measures by the quantity alone: beside 'LVDT' or 'measured' a bare 'Position' may be
+    meant, and beside a bare 'Position', where target says no more than that, any other position.
+    """
+    channels = recording.channels
+    by_index = {one.index: one for one in named}
+    found = []
+    for t, m in pairs:
+        target, measured = by_index[t], by_index[m]
+        for one in named:
+            if (
+                one.role is None
+                and one.index != m
+                and one.quantity is not None
+                and one.quantity == (target.quantity or measured.quantity)
+                and _of_one_kind(target, one, channels)
+                and (_own(one) <= _own(target) or (measured.role is None and not _own(target)))
+                and not any(_same(channels[i], channels[one.index]) for i in (t, m))
+                and _alike(recording, t, one.index)
+            ):
+                found.append(one)
+    return found
+
+
+def _by_targets_name(named: list[_Named], recording: Recording) -> list[tuple[int, int]]:
+    """Pairs where only target is named: with the one channel of its kind, degree of freedom and motion.
+
+    That channel says that it is a position (Table Position), shares a word with target (x_p beside x_ref) or is a
+    letter (X); 'input' may be the controller's or the actuator's. Raises ChannelError where several channels are that.
+    """
+    channels = recording.channels
+    kinds = (None, "displacement", "rotation")
+    if any(one.role == "measured" and one.quantity in kinds for one in named):
+        return []
+    targets = _once([one for one in named if one.role == "target" and one.quantity in kinds], channels)
+    pairs = []
+    for rest in dict.fromkeys(one.rest for one in targets):
+        target = _best([one for one in targets if one.rest == rest])
+        if target is None:
+            continue
+        ours, alike = _own(target), []
+        for one in named:
+            theirs = _own(one)
+            if (
+                one.role is None
+                and one.quantity in kinds
+                and (one.by_word or ours & theirs or [len(word) for word in one.rest] == [1])
+                and not _INPUT & {*one.rest}
+                and _of_one_kind(target, one, channels)
+                and (ours <= theirs or theirs <= ours)
+                and not _same(channels[target.index], channels[one.index])
+                and _alike(recording, target.index, one.index)
+            ):
+                alike.append(one)
+        alike = _once(alike, channels)
+        if len(alike) > 1:
+            raise _several((target, *alike), channels, recording.file)
+        pairs += [(target.index, one.index) for one in alike]
+    # One channel cannot answer two targets.
+    return pairs if len({m for _, m in pairs}) == len(pairs) else []
 
 
 def _same(a: Channel, b: Channel) -> bool:
@@ -265,7 +362,7 @@ def _only(measured: list[_Named]) -> _Named | None:
     return stated[0] if len(stated) == 1 else None
 
 
-def _by_likeness(recording: Recording, named: list[_Named]) -> tuple[int, int, str]:
+def _by_likeness(recording: Recording, named: list[_Named]) -> tuple[int, int, Said]:
     """The two channels most alike at a small lag, target first, and why they are taken for a pair.
 
     Who leads does not decide which is target. Raises ChannelError, which names what was found.
@@ -274,78 +371,65 @@ def _by_likeness(recording: Recording, named: list[_Named]) -> tuple[int, int, s
     nothing = "no likely target/measured pair: no name says target, command, measured or feedback"
     candidates, twice = _candidates(channels, named)
     best, n_compared, n_rates = None, 0, 0
-    for (a, x), (b, y) in itertools.combinations(candidates[:_MOST_CHANNELS], 2):
-        one, other = channels[a.index], channels[b.index]
-        if one.time != other.time:
-            x, y = _together(recording, a.index, b.index)
-        if len(x) != len(y) or len(x) <= 16 or not 0.5 < np.linalg.norm(y) / np.linalg.norm(x) < 2:
+    for a, b in itertools.combinations(candidates[:_MOST_CHANNELS], 2):
+        found = likeness(recording, a.index, b.index)
+        if found is None:
+            n_rates += rate_of(recording, a.index) is None
             continue
-        rate = one.time.rate_hz if one.time is not None else recording.rate_hz
-        if rate is None:
-            n_rates += 1
-            continue
-        longest = max(1, int(_LONGEST_LAG_S * rate))
         n_compared += 1
-        correlation, lag = _likeness(x, y, min(longest, len(x) // 4))
-        if correlation >= _LIKENESS and (best is None or correlation > best[2]):
-            best = (a, b, correlation, lag, x, y)
+        if found.correlation >= LIKENESS and (best is None or found.correlation > best[2].correlation):
+            best = (a, b, found)
     if best is None:
         copied = next((f", and '{channels[c].name}' is an exact copy of '{channels[o].name}'" for c, o in twice), "")
         said = ", and no two channels move alike" if n_compared else ", and no two channels could be compared"
         if n_rates and not n_compared:
             said = ", and without a sampling rate none were compared"
         raise ChannelError(f"{nothing}{copied or said}", file=recording.file, advice=_NAME)
-    a, b, correlation, lag, x, y = best
+    a, b, found = best
     names = f"'{channels[a.index].name}' and '{channels[b.index].name}'"
     if _two_of_a_kind(a, b):
         raise ChannelError(
             f"{nothing}; {names} move alike, but may be two degrees of freedom", file=recording.file, advice=_NAME
         )
-    by = _which_is_target(a.index, b.index, lag, x, y, {o for _, o in twice})
+    deeper = {one.index: _read_name(one.index, channels[one.index], 9, 9).role for one in (a, b)}
+    by = _which_is_target(a.index, b.index, found, {o for _, o in twice})
+    # A word far up in the path chooses nothing, and forbids the contrary.
+    if by is not None and (deeper[by[0]] == "measured" or "target" in {deeper[i] for i in deeper if i != by[0]}):
+        by = None
     if by is None:
         raise ChannelError(
-            f"{nothing}; {names} move alike (correlation {correlation:.3f}), but which is target cannot be told",
+            f"{nothing}; {names} move alike (correlation {found.correlation:.3f}), but which is target cannot be told",
             file=recording.file,
             code="which_is_target",
             advice=_NAME,
         )
     target, reason = by
     measured = b.index if target == a.index else a.index
-    follows = lag if target == a.index else -lag
-    when = f"{abs(follows)} samples {'later' if follows >= 0 else 'earlier'}"
+    late = abs(found.lag)
     first, second = channels[target].name, channels[measured].name
-    why = f"a guess, for no name tells: '{second}' follows '{first}' {when} (correlation {correlation:.3f}), {reason}"
-    return target, measured, why
+    why = (
+        f"a guess, for no name tells: '{second}' follows '{first}' {late} sample{'s' if late != 1 else ''} later "
+        f"(correlation {found.correlation:.3f}), {reason}"
+    )
+    return target, measured, Said(why, "pair_guessed", (), f"if '{first}' is target (a guess: no name tells)")
 
 
-def _together(recording: Recording, a: int, b: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Two channels with clocks of their own as they move together, less their means; nothing where they do not."""
-    try:
-        moved = on_one_clock(recording, (f"#{a}", f"#{b}")).channels
-    except RecordingError:
-        return np.zeros(0), np.zeros(0)
-    x, y = (moved[i].values[:_MOST_SAMPLES] for i in (a, b))
-    return (x - x.mean(), y - y.mean()) if np.ptp(x) > 0 and np.ptp(y) > 0 else (np.zeros(0), np.zeros(0))
-
-
-def _candidates(
-    channels: tuple[Channel, ...], named: list[_Named]
-) -> tuple[list[tuple[_Named, NDArray[np.float64]]], list[tuple[int, int]]]:
-    """Channels that may be motion, each once, less their means; and which are copies of which."""
-    found: list[tuple[_Named, NDArray[np.float64]]] = []
+def _candidates(channels: tuple[Channel, ...], named: list[_Named]) -> tuple[list[_Named], list[tuple[int, int]]]:
+    """Channels that may be motion, each once; and which are copies of which."""
+    found: list[_Named] = []
     twice: list[tuple[int, int]] = []
     for one in named:
-        values = channels[one.index].values[:_MOST_SAMPLES]
+        values = channels[one.index].values[:MOST_SAMPLES]
         rising = len(values) > 1 and bool(np.all(np.diff(values) > 0)) if np.isfinite(values).all() else False
         if one.quantity not in (None, "displacement") or len(values) <= 16 or not np.isfinite(values).all() or rising:
             continue
         if not np.ptp(values) > 0:
             continue
-        of = next((o.index for o, _ in found if is_copy(channels[o.index].values, channels[one.index].values)), None)
+        of = next((o.index for o in found if is_copy(channels[o.index].values, channels[one.index].values)), None)
         if of is not None:
             twice.append((one.index, of))
         else:
-            found.append((one, values - values.mean()))
+            found.append(one)
     return found, twice
 
 
@@ -357,40 +441,15 @@ def _two_of_a_kind(a: _Named, b: _Named) -> bool:
     return a.quantity is not None or (said[0] == said[1] != [])
 
 
-def _which_is_target(
-    a: int, b: int, lag: int, x: NDArray[np.float64], y: NDArray[np.float64], copied: set[int]
-) -> tuple[int, str] | None:
-    """Which of two like channels is target, never by who leads alone; None where nothing tells.
+def _which_is_target(a: int, b: int, found: Likeness, copied: set[int]) -> tuple[int, str] | None:
+    """Which of two like channels is target: the one that is logged twice, else the first of a file; None if unclear.
 
-    A logged copy is mostly of what was sent. An actuator that follows late loses amplitude, and target stands before
-    measured in a file: where one of these agrees with the lag, and nothing speaks against it.
+    Who leads never chooses. Where that one is the later of both, the choice may be wrong, and nobody is left to tell.
     """
-    by_motion = _by_motion(a, b, lag, x, y)
     if (a in copied) != (b in copied):
-        twice = a if a in copied else b
-        if by_motion is None or by_motion[0] == twice:
-            return twice, "and the other is there twice, as a command that is logged"
-        return None
-    return by_motion
-
-
-def _by_motion(a: int, b: int, lag: int, x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[int, str] | None:
-    if lag == 0:
-        return a, "and stands behind it in the file"
-    # Of the one that is late over the other.
-    gain = float(np.linalg.norm(y) / np.linalg.norm(x)) ** (1 if lag > 0 else -1)
-    if gain <= _LOSS:
-        return (a if lag > 0 else b), f"late and smaller ({gain:.2f}), as an actuator is"
-    if lag > 0 and gain < 1 / _LOSS:
-        return a, "and stands behind it in the file"
-    return None
-
-
-def _likeness(x: NDArray[np.float64], y: NDArray[np.float64], longest: int) -> tuple[float, int]:
-    """The highest correlation of y(t + lag) with x(t) for |lag| <= longest, and that lag."""
-    n = 1 << (len(x) + longest).bit_length()
-    product = np.fft.irfft(np.fft.rfft(y, n) * np.conj(np.fft.rfft(x, n)), n)
-    lags = np.arange(-longest, longest + 1)
-    values = product[lags] / (np.linalg.norm(x) * np.linalg.norm(y))
-    at = int(values.argmax())
-    return float(values[at]), int(lags[at])
+        target, reason = (a if a in copied else b), "and the other is there twice, as a command that is logged"
+    else:
+        target, reason = a, "and stands behind it in the file"
+    # Of measured after target, and over it.
+    lag, gain = (found.lag, found.gain) if target == a else (-found.lag, 1 / found.gain)
+    return (target, reason) if lag == 0 or (lag > 0 and gain <= _MOST_GAIN) else None

@@ -143,16 +143,22 @@ def laboratory(alpha_es: int | None, alpha: float = NOMINAL_ALPHA, damper: Kelvi
     return VirtualTest(frame, (actuator,), (Element(BoucWen()),), "cr", paper.RATE_HZ)
 
 
+def checked_name(name: str) -> str:
+    """The name of a record of the paper's; SettingError for any other."""
+    if name not in RECORDS:
+        near = difflib.get_close_matches(name.upper(), RECORDS, 1)
+        meant = f"; did you mean {near[0]}?" if near else ""
+        raise SettingError(f"the paper has no record '{name}': expected one of {', '.join(RECORDS)}{meant}")
+    return name
+
+
 def choose_records(files: Mapping[str, RecordFile]) -> dict[str, UsedRecord]:
     """The user's files where given, else the far-field set's CHY101-N and stand-ins.
 
     Raises SettingError for a name that the paper has not, RecordingError for a file or where the records are missing.
     """
     for name in files:
-        if name not in RECORDS:
-            near = difflib.get_close_matches(name.upper(), RECORDS, 1)
-            meant = f"; did you mean {near[0]}?" if near else ""
-            raise SettingError(f"the paper has no record '{name}': expected one of {', '.join(RECORDS)}{meant}")
+        checked_name(name)
     used = {}
     for name, instead in RECORDS.items():
         if name in files:

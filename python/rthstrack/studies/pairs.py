@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from rthstrack.recording.chosen import ChosenPairs
     from rthstrack.virtual_test.parts import VirtualTest
 
 Truth: TypeAlias = tuple[float, float] | Callable[[float], tuple[float, float] | None]
@@ -85,7 +86,7 @@ def read_pairs(
     file = os.fspath(path)
     if file.lower().endswith(".toml"):
         return _pairs_of_run(_simulated(file), file)
-    recording, sampled_hz, channels, proposal = read_chosen(
+    found = read_chosen(
         file,
         targets=targets,
         measured=measured,
@@ -100,10 +101,16 @@ def read_pairs(
         block=block,
         lines=lines,
     )
+    return pairs_in(found, file, own_truth=not scale)
+
+
+def pairs_in(chosen: ChosenPairs, file: str, *, own_truth: bool = False) -> list[Pair]:
+    """Channels that were chosen, as pairs called by the file; own_truth: a run file knows what is true of its own."""
+    recording, sampled_hz, channels, proposal = chosen
     found = []
     for actuator, (asked, answered) in enumerate(channels):
         t, m = recording.channel(asked), recording.channel(answered)
-        truth = None if scale else _truth_in_file(file, t.name, m.name)
+        truth = _truth_in_file(file, t.name, m.name) if own_truth else None
         notes = list(recording.notes)
         if proposal and truth is None:
             notes.insert(0, f"no channels were named: studied target '{t.name}', measured '{m.name}' ({proposal})")

@@ -114,7 +114,7 @@ def assess_pair(
     recording: Recording,
     target: str,
     measured: str,
-    proposal: str | None = None,
+    proposal: Said | None = None,
     *,
     part: str = "whole",
     origin: Mapping[str, Any] | None = None,
@@ -165,7 +165,8 @@ def assess_pair(
     if whole and proposal is not None:
         words = f"no channels were named: judged target '{asked.name}', measured '{answered.name}' ({proposal})"
         said.insert(0, Said(words, "channels_proposed"))
-    causes = [*dict.fromkeys(note.cause for note in guesses)]
+    causes = [proposal.cause] if proposal is not None and proposal.code == "pair_guessed" else []
+    causes += dict.fromkeys(note.cause for note in guesses)
     causes += [f"but {warning.cause}" for warning in found.warnings if warning.code == "copy"]
     return dataclasses.replace(found, warnings=tuple(said), verdict=", ".join([found.verdict, *causes]))
 

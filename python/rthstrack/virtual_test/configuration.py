@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from rthstrack.errors import ConfigurationError
+from rthstrack.errors import ConfigurationError, RthstrackError
 from rthstrack.ground_motion.table import check_ground_motion, ground_motion_from
 from rthstrack.keyed_table import NUMBER, NUMBERS, SQUARE, Table, read_toml
 from rthstrack.virtual_test.parts import (
@@ -100,7 +100,12 @@ class Configuration(NamedTuple):
 
     def motion_from(self, base_dir: str | os.PathLike[str]) -> GroundMotion | TargetMotion:
         """The ground motion or target, its file looked for in `base_dir`; raises what reading it raises."""
-        return (ground_motion_from if self.test.structure.n_dof else target_from)(self.motion, base_dir)
+        try:
+            return (ground_motion_from if self.test.structure.n_dof else target_from)(self.motion, base_dir)
+        except RthstrackError as error:
+            # The advice speaks of keys of the configuration, which no command calls otherwise.
+            words, error.advice = error.words, ""
+            raise error.reworded(words) from None
 
 
 def read_configuration(path: str | os.PathLike[str]) -> Configuration:

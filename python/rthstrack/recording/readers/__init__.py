@@ -70,6 +70,11 @@ def _is_accelerogram(b: Beginning) -> bool:
     return accelerograms.kind(b.head) is not None
 
 
+def _is_tdm(b: Beginning) -> bool:
+    # The numbers beside it begin with nothing that would tell what they are.
+    return b"<usi:tdm" in b.head or (b.file.suffix.lower() == ".tdx" and b.file.with_suffix(".tdm").is_file())
+
+
 def _is_workbook(b: Beginning) -> bool:
     from rthstrack.recording.readers import excel
 
@@ -92,6 +97,7 @@ FORMATS = (
     ),
     Format("HDF5", "HDF5", "hdf5", (".h5", ".hdf5", ".hdf", ".he5"), lambda b: b.is_hdf5),
     Format("TDMS", "TDMS", "tdms", (".tdms",), lambda b: b.starts(b"TDSm")),
+    Format("TDM", "TDM", "tdm", (".tdm",), _is_tdm),
     Format("Parquet", "Parquet", "parquet", (".parquet", ".pq"), lambda b: b.starts(b"PAR1")),
     Format("Arrow stream", "Arrow", "arrow", (".arrows", ".arrow"), lambda b: b.starts(b"\xff\xff\xff\xff")),
     Format("Arrow file", "Arrow", "arrow", (".arrow", ".feather"), lambda b: b.starts(b"ARROW1\0\0")),

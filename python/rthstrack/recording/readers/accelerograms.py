@@ -11,6 +11,7 @@ from rthstrack.errors import RecordingError
 from rthstrack.recording.readers.arrays import tidy
 from rthstrack.recording.readers.at2 import acceleration_unit, decoded
 from rthstrack.recording.readers.contents import Contents, RateStatement, Series
+from rthstrack.said import Said
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -69,9 +70,14 @@ def read(path: Path) -> Contents:
         raise RecordingError(f"{source} states {rate_hz:g} Hz; expected a positive rate")
     if len(values) < 2:
         raise RecordingError(f"expected at least 2 values below the header, found {len(values)}; the file is truncated")
-    notes = tuple(f"header: {' '.join(line.split())}" for line in lines[:2] if line.strip())
+    notes = [f"header: {' '.join(line.split())}" for line in lines[:2] if line.strip()]
+    n_records = sum(_V2_DATA.match(line) is not None for line in lines) if form == "V2" else 1
+    if n_records > 1:
+        notes.insert(
+            0, Said(f"the file holds {n_records} accelerations: the first was read", "first_of_several", (n_records,))
+        )
     series = (Series("acceleration", "acceleration", unit, values),)
-    return Contents(f"{form} accelerogram", series, (), (RateStatement(source, tidy(rate_hz)),), notes)
+    return Contents(f"{form} accelerogram", series, (), (RateStatement(source, tidy(rate_hz)),), tuple(notes))
 
 
 def _esm(lines: list[str]) -> tuple[NDArray[np.float64], str, float, str]:

@@ -12,7 +12,7 @@ import numpy as np
 from rthstrack.errors import RecordingError
 from rthstrack.recording.readers import mat
 from rthstrack.recording.readers.hdf5 import check_size
-from rthstrack.recording.readers.matlab import Cell, Opaque, Struct, contents, has_objects
+from rthstrack.recording.readers.matlab import SPARSE, Cell, Opaque, Struct, contents, has_objects
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -51,7 +51,7 @@ def _node(file: h5py.File, item: Any, depth: int) -> Node:
         return Opaque(kind or "object", kind != "function_handle")
     if isinstance(item, h5py.Group):
         if "MATLAB_sparse" in item.attrs:
-            return Opaque("a sparse matrix", False)
+            return SPARSE
         return _struct(file, item, depth)
     if not isinstance(item, h5py.Dataset) or item.shape is None:
         return Opaque("empty", False)

@@ -18,7 +18,7 @@ import numpy as np
 
 from rthstrack.recording.readers.apart import first_line, work
 from rthstrack.recording.readers.contents import Contents, RateStatement, Series
-from rthstrack.recording.readers.matlab import Cell, Node, Opaque, Struct, contents, has_objects
+from rthstrack.recording.readers.matlab import SPARSE, Cell, Node, Opaque, Struct, contents, has_objects
 from rthstrack.recording.readers.matlab_objects import object_node
 from rthstrack.said import Said
 
@@ -120,7 +120,7 @@ def _node(value: Any, depth: int) -> Node:
     if hasattr(value, "classname") and not isinstance(value, np.ndarray):
         return Opaque(str(value.classname), True)
     if not isinstance(value, np.ndarray):
-        return Opaque("a sparse matrix" if hasattr(value, "tocsc") else f"a {type(value).__name__}", False)
+        return SPARSE if hasattr(value, "tocsc") else Opaque(f"a {type(value).__name__}", False)
     if value.dtype.names:
         elements = value.ravel(order="F")
         return Struct([{key: _node(one[key], depth + 1) for key in value.dtype.names} for one in elements])

@@ -43,6 +43,9 @@ class Opaque:
     is_object: bool
 
 
+SPARSE = Opaque("a sparse matrix (save what full() makes of it)", False)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Table:
     """Named columns with their units; `label` is what the whole is called in its file."""
