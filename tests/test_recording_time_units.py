@@ -10,6 +10,7 @@ import pytest
 from field_motion import GAIN, measured, table, target
 from rthstrack.cli import main
 from rthstrack.errors import RecordingError, SettingError
+from rthstrack.recording import read_recording
 from rthstrack.recording.chosen import read_chosen
 from rthstrack.said import coded
 
@@ -70,6 +71,26 @@ def test_where_it_can_be_either_it_is_asked(tmp_path: Path, name: str, stamps: A
         read_chosen(path)
     assert caught.value.code == "time_unit"
     assert read_chosen(path, units={name: "s"} if name == "Time (ms)" else {name: "ms"}).rate_hz > 9
+
+
+def test_a_step_without_a_unit_that_makes_no_rigs_rate_is_asked_about(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", dt=10.0, target=T, measured=T)
+    (tmp_path / "a.csv").write_text("Sampling period: 10\ntarget,measured\n1,2\n2,3\n3,5\n")
+    for name in ("a.npz", "a.csv"):
+        with pytest.raises(RecordingError, match=r"states no unit: in s .* 0\.1 Hz, in ms .* 100 Hz") as caught:
+            read_recording(tmp_path / name)
+        assert caught.value.code == "time_unit"
+        assert read_recording(tmp_path / name, rate_hz=100).rate_hz == 100
+    (tmp_path / "a.csv").write_text("Sampling period: 10 s\ntarget,measured\n1,2\n2,3\n3,5\n")
+    assert read_recording(tmp_path / "a.csv").rate_hz == 0.1
+
+
+def test_dates_that_are_rounded_say_which_rates_they_allow(tmp_path: Path) -> None:
+    rows = "".join(f"10:00:{i // 100:02d},{i % 7},{i % 5}\n" for i in range(800))
+    (tmp_path / "a.csv").write_text("Time,target,measured\n" + rows)
+    (told,) = [note for note in map(coded, read_recording(tmp_path / "a.csv").notes) if note.code == "rounded_time"]
+    low_hz, high_hz = told.values
+    assert low_hz < 100 < high_hz
 
 
 def test_the_verdict_says_that_the_unit_is_a_guess(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -53,6 +53,11 @@ def rate_of(name: str, value: object) -> float | None:
     return tidy(number if key in _RATES else 1 / number)
 
 
+def states_unit(name: str) -> bool:
+    """Whether the name of a number that states the rate says in which unit."""
+    return re.search(r"(_hz|_s|wf_increment)$", name.strip(), re.IGNORECASE) is not None
+
+
 def tidy(rate: float) -> float:
     """1 / 0.001 as 1000 to the last bit; 1 / 0.003 stays what it is."""
     return float(round(rate)) if abs(rate - round(rate)) < 1e-9 * rate else rate
@@ -146,7 +151,7 @@ def collect(
     for name, array, unit in entries:
         rate = rate_of(name, array) if array.size == 1 and array.dtype.kind in "iuf" else None
         if rate is not None:
-            stated.append(RateStatement(f"'{name}'", rate))
+            stated.append(RateStatement(f"'{name}'", rate, None, states_unit(name)))
         elif array.dtype.kind in "Mm" and array.ndim == 1:
             clocks.append(clock(name, array, len(series)))
         else:

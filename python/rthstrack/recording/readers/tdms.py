@@ -12,7 +12,7 @@ import numpy as np
 from nptdms import TdmsFile
 
 from rthstrack.errors import RecordingError
-from rthstrack.recording.readers.arrays import as_float, clock, is_numeric, rate_of, tidy, unit_in
+from rthstrack.recording.readers.arrays import as_float, clock, is_numeric, rate_of, states_unit, tidy, unit_in
 from rthstrack.recording.readers.contents import Clock, Contents, RateStatement, Series
 
 if TYPE_CHECKING:
@@ -112,5 +112,7 @@ def _rates(source: str, properties: Any) -> list[RateStatement]:
     for key, value in properties.items():
         rate = rate_of(key, value) if isinstance(value, (int, float)) else None
         if rate is not None:
-            found.append(RateStatement(f"property '{key}'" + (f" of '{source}'" if source else ""), rate))
+            found.append(
+                RateStatement(f"property '{key}'" + (f" of '{source}'" if source else ""), rate, None, states_unit(key))
+            )
     return found

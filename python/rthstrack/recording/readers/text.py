@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -82,7 +82,10 @@ def contents_of(content: bytes, part: Part = WHOLE) -> Contents:
             seconds = seconds_since_first(values, dated=kind == "dates")
             clocks.append(Clock(label, label, seconds, first, len(series)))
     statements = rate_statements(table["preamble"], notes, decimal_comma=table["decimal_comma"])
-    series = _own_starts(series, table["preamble"], decimal_comma=table["decimal_comma"])
+    waveforms = _waveforms(table["preamble"], decimal_comma=table["decimal_comma"])
+    if waveforms is not None:
+        series = _own_starts(series, waveforms)
+        statements = _of_channels(statements, series, waveforms)
     form = f"text, {table['delimiter']} between columns" if len(table["columns"]) > 1 else "text, one column"
     if table["decimal_comma"]:
         form += ", decimal comma"
@@ -91,20 +94,46 @@ def contents_of(content: bytes, part: Part = WHOLE) -> Contents:
     return Contents(form, tuple(series), tuple(clocks), tuple(statements), tuple(notes), nameless)
 
 
-def _own_starts(series: list[Series], preamble: list[str], *, decimal_comma: bool) -> list[Series]:
-    """The series with what LabVIEW's header says of each channel's begin (X0, in s), where channels differ in it."""
+class _Waveforms(NamedTuple):
+    """What LabVIEW's header says of channels: which series is the first of them, and each how many, and X0 in s."""
+
+    first: int
+    step: int
+    starts: list[float]
+
+
+def _waveforms(preamble: list[str], *, decimal_comma: bool) -> _Waveforms | None:
+    """None where the text is not LabVIEW's, or its header says of no channel when it begins."""
     cells = {line.split(mark)[0].strip(): line.split(mark) for line in preamble for mark in "\t,;" if mark in line}
     kind = [cell.strip().lower() for cell in cells.get("X_Columns", [])][1:2]
+    first, step = {"no": (0, 1), "one": (1, 1), "multi": (1, 2)}.get("".join(kind), (0, 0))
     texts = [cell.strip().replace(",", ".") if decimal_comma else cell.strip() for cell in cells.get("X0", [])[1:]]
     starts = [_start(text) for text in texts if text]
     times = [_time_of_day(cell) for cell in cells.get("Time", [])[1:] if cell.strip()]
     if len(times) == len(starts) and not any(map(math.isnan, times)):
         starts = [start + time - min(times) for start, time in zip(starts, times, strict=True)]
-    if kind not in (["no"], ["one"]) or len(set(starts)) < 2 or any(math.isnan(start) for start in starts):
+    if not step or any(map(math.isnan, starts)):
+        return None
+    return _Waveforms(first, step, starts)
+
+
+def _own_starts(series: list[Series], waveforms: _Waveforms) -> list[Series]:
+    """The series with the begin of each channel, where channels differ in it."""
+    first, step, starts = waveforms
+    if len(set(starts)) < 2:
         return series
-    first = 1 if kind == ["one"] else 0
-    of = dict(enumerate(starts, start=first))
+    of = {first + step * i: start for i, start in enumerate(starts)}
     return [replace(one, start_s=of.get(i)) for i, one in enumerate(series)]
+
+
+def _of_channels(statements: list[RateStatement], series: list[Series], waveforms: _Waveforms) -> list[RateStatement]:
+    """Statements that hold for one channel each, with that channel's path in place of its number."""
+    paths = {str(i): one.path for i, one in enumerate(series[waveforms.first :: waveforms.step])}
+    return [
+        one if one.channel is None else replace(one, channel=paths[one.channel])
+        for one in statements
+        if one.channel is None or one.channel in paths
+    ]
 
 
 def _start(text: str) -> float:
@@ -159,7 +188,14 @@ def rate_statements(preamble: list[str], notes: list[str], *, decimal_comma: boo
                         notes.append(f"header '{key}' states {text.strip()}, which was not used")
                         continue
                     rate = value * factor if measures == "frequency" else 1 / (value * factor)
-                    statements.append(RateStatement(f"header '{key}'", tidy(rate), str(at) if len(texts) > 1 else None))
+                    statements.append(
+                        RateStatement(
+                            f"header '{key}'",
+                            tidy(rate),
+                            str(at) if len(texts) > 1 else None,
+                            bool(unit or (cell and size_in_si(cell, measures)) or key.lower().endswith("hz")),
+                        )
+                    )
     return _unique(statements)
 
 
@@ -174,7 +210,7 @@ def _unique(statements: list[RateStatement]) -> list[RateStatement]:
     for statement in statements:
         by_source.setdefault(statement.source, []).append(statement)
     kept: list[RateStatement] = []
-    for source, group in by_source.items():
+    for group in by_source.values():
         rates = {statement.rate_hz for statement in group}
-        kept += [RateStatement(source, rates.pop())] if len(rates) == 1 else group
+        kept += [replace(group[0], channel=None)] if len(rates) == 1 else group
     return kept
