@@ -46,15 +46,20 @@ _WIDE_BRACKETS = str.maketrans("（）［］【】", "()[][]")
 
 
 def split_unit(name: str) -> tuple[str, str | None]:
-    """A channel's name without its unit, and the unit: from `Disp (mm)`, `Disp [mm]`, `Disp, mm` or `disp_mm`."""
+    """A channel's name without its unit, and the unit: from `Disp (mm)`, `Disp [mm]`, `Disp, mm`, `Disp / mm`,
+    `Disp mm` or `disp_mm`."""
     name = name.translate(_WIDE_BRACKETS)
     found = re.fullmatch(r"(.*\S)\s*\[([^\[\]]{1,16})\]", name)
     # An index ([:,0]) is no unit.
     if found and re.search(r"[^\W\d_]|[%°-]", found[2]):
         return found[1], found[2].strip()
-    found = re.fullmatch(r"(.*\S)\s*\(([^()]{1,16})\)", name) or re.fullmatch(r"(.*\S)\s*,\s+(\S{1,8})", name)
+    found = re.fullmatch(r"(.*\S)\s*\(([^()]{1,16})\)", name)
+    found = found or re.fullmatch(r"(.*\S)(?:\s*,|\s+/)\s+(\S{1,8})", name)
     if found and is_unit(found[2]):
         return found[1], found[2].strip()
+    found = re.fullmatch(r"(.*\S)\s+(\S{2,4})", name)
+    if found and is_unit_suffix(found[2]):
+        return found[1], found[2]
     stem, _, suffix = name.rpartition("_")
     if stem and is_unit_suffix(suffix):
         return stem, suffix

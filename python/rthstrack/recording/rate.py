@@ -14,7 +14,7 @@ from rthstrack.recording.names import FILLERS, role, words
 from rthstrack.recording.readers.arrays import tidy
 from rthstrack.recording.readers.stamps import Irregular, Uniform, examine
 from rthstrack.recording.recording import select
-from rthstrack.recording.time_units import DOUBTED_SLOW_HZ, SECONDS, CountedIn, counted_in, rounded_step
+from rthstrack.recording.time_units import DOUBTED_SLOW_HZ, SECONDS, CountedIn, counted_in, rounded_step, unwrapped
 from rthstrack.said import Said
 from rthstrack.units import seconds_in, split_unit
 
@@ -76,7 +76,16 @@ _HINTS = re.compile(r"tick|clock|count|date|stamp", re.IGNORECASE)
 _TIME_NAMES = re.compile(
     r"t|times?|tout|zeit|messzeit|temps|tiempo|tempo|x[_ ]values?|time[ _-]?stamps?|time[ _-]?(?:axis|vector|base|\d+)|"
     r"(?:elapsed|running|relative|test|total|run|sample|measurement|record|simulation|sim)[ _-]?time|"
-    "tijd|tid|czas|zaman|aika|čas|время|час|χρόνος|時間|时间|時刻|时刻|経過時間|시간|समय|الزمن|الوقت|זמן",
+    "tijd|tijdstip|tid|czas|zaman|süre|aika|čas|vrijeme|vreme|timp|idő|waktu|thời gian|เวลา|زمان|время|час|χρόνος|"
+    "時間|时间|時刻|时刻|経過時間|시간|समय|الزمن|الوقت|זמן",
+    re.IGNORECASE,
+)
+
+
+# Names of time that mean other things too.
+_TIME_OR_ELSE = re.compile(
+    r"(time|zeit)\b.*|(date|datum|fecha)[ _-]?(time|zeit)?|elapsed|duration|dauer|laufzeit|durée|zeitstempel|"
+    "horodatage|seconds|sekunden",
     re.IGNORECASE,
 )
 
@@ -113,7 +122,7 @@ def _time_named(series: Series, unit_s: float | None) -> str:
         return ""
     if _TIME_NAMES.fullmatch(stem):
         return "plainly" if stem != "T" or unit_s is not None else "loosely"
-    if re.match(r"(time|zeit)\b|(date|datum|fecha)[ _-]?(time|zeit)?$", stem, re.IGNORECASE):
+    if _TIME_OR_ELSE.fullmatch(stem):
         return "loosely"
     # t1, t_target, cmd time, but not x_t.
     found = words(stem)
@@ -148,9 +157,12 @@ def _unit(series: Series) -> str | None:
 
 def _numeric_time(index: int, series: Series, how: str = "") -> TimeColumn:
     """A column of numbers as time, in the unit that it states or that fits it best."""
-    unit = counted_in(series.values, seconds_in(_unit(series)))
+    stamps, wraps = unwrapped(series.values)
+    unit = counted_in(stamps, seconds_in(_unit(series)))
     what = f"time column '{series.path}'" + (f" ({how})" if how else "")
-    return TimeColumn(what, series.path, series.values, unit.unit_s, index=index, unit=unit)
+    if wraps:
+        what += f" (begins anew at {wraps:.10g})"
+    return TimeColumn(what, series.path, stamps, unit.unit_s, index=index, unit=unit)
 
 
 def _nameless_times(contents: Contents) -> list[TimeColumn]:

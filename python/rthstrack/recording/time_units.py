@@ -82,6 +82,26 @@ def counted_in(stamps: NDArray[np.float64], stated_s: float | None) -> CountedIn
     return CountedIn(1.0, None, f"does not state its unit: it may be {readings}")
 
 
+# Where counters of so many bits begin anew.
+_WRAPS = (2.0**16, 2.0**24, 2.0**31, 2.0**32)
+
+
+def unwrapped(stamps: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    """Stamps of a counter that begins anew counted on, and its range; as they are, and 0, where none does."""
+    with np.errstate(all="ignore"):
+        steps = np.diff(stamps)
+        back = steps < 0
+        n_back = np.count_nonzero(back)
+        if not n_back or n_back > len(steps) // 4 or not np.isfinite(stamps).all():
+            return stamps, 0.0
+        step = float(np.median(steps[~back]))
+        for bound in _WRAPS:
+            across = steps[back] + bound
+            if float(np.ptp(stamps)) < bound and bool(np.all(np.abs(across - step) <= max(0.5 * step, 1))):
+                return stamps + bound * np.concatenate([[0.0], np.cumsum(back)]), bound
+    return stamps, 0.0
+
+
 def _stated(stated_s: float, step: float, span: float) -> CountedIn:
     """A stated unit is followed, unless another one makes a rig's record of what it makes none of."""
     hz = 1 / (step * stated_s)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 from dataclasses import replace
@@ -11,6 +12,7 @@ import numpy as np
 
 from rthstrack._core import read_text as core_read_text
 from rthstrack.errors import RecordingError
+from rthstrack.recording.names import quantities, role, words
 from rthstrack.recording.readers.arrays import tidy
 from rthstrack.recording.readers.contents import WHOLE, Clock, Contents, Part, RateStatement, Series
 from rthstrack.said import Said
@@ -66,11 +68,18 @@ def contents_of(content: bytes, part: Part = WHOLE) -> Contents:
         raise RecordingError(
             words, code="broken_row", values=(line,), advice="or read only lines that are whole: {lines}"
         ) from None
+    encoding = table["encoding"]
+    names = [name for _, name, *_ in table["columns"]]
+    if encoding == "Latin-1" and (found := _code_page([name for name in names if name])):
+        encoding = found
+        names = [name and name.encode("latin-1").decode(found) for name in names]
     series: list[Series] = []
     clocks: list[Clock] = []
     notes: list[str] = [Said(*note) for note in table["notes"]]
     nameless = True
-    for index, name, unit, kind, values in table["columns"]:
+    for (index, _, unit, kind, values), name in zip(table["columns"], names, strict=True):
+        if unit and encoding in _CODE_PAGES:
+            unit = unit.encode("latin-1").decode(encoding, "replace")
         nameless &= name is None
         label = f"column {index}" if name is None else name
         if kind == "numbers":
@@ -89,9 +98,29 @@ def contents_of(content: bytes, part: Part = WHOLE) -> Contents:
     form = f"text, {table['delimiter']} between columns" if len(table["columns"]) > 1 else "text, one column"
     if table["decimal_comma"]:
         form += ", decimal comma"
-    if table["encoding"] != "UTF-8":
-        form += f", {table['encoding']}"
+    if encoding != "UTF-8":
+        form += f", {encoding}"
     return Contents(form, tuple(series), tuple(clocks), tuple(statements), tuple(notes), nameless)
+
+
+# Older ways to spell names outside western Europe.
+_CODE_PAGES = ("GB18030", "Shift-JIS", "EUC-KR", "Windows-1251", "Big5")
+
+
+def _code_page(names: list[str]) -> str | None:
+    """In which code page the names, read as Latin-1, hold the most words that are known; None where in no other."""
+    if all(name.isascii() for name in names):
+        return None
+    known: dict[str | None, int] = {None: sum(map(_n_known, names))}
+    for page in _CODE_PAGES:
+        with contextlib.suppress(UnicodeDecodeError):
+            known[page] = sum(_n_known(name.encode("latin-1").decode(page)) for name in names)
+    return max(known, key=known.__getitem__)
+
+
+def _n_known(name: str) -> int:
+    found = words(name)
+    return (role(found).name is not None) + len(quantities(found))
 
 
 class _Waveforms(NamedTuple):
