@@ -76,7 +76,7 @@ _HINTS = re.compile(r"tick|clock|count|date|stamp", re.IGNORECASE)
 _TIME_NAMES = re.compile(
     r"t|times?|tout|zeit|messzeit|temps|tiempo|tempo|x[_ ]values?|time[ _-]?stamps?|time[ _-]?(?:axis|vector|base|\d+)|"
     r"(?:elapsed|running|relative|test|total|run|sample|measurement|record|simulation|sim)[ _-]?time|"
-    "tijd|tijdstip|tid|czas|zaman|süre|aika|čas|vrijeme|vreme|timp|idő|waktu|thời gian|เวลา|زمان|время|час|χρόνος|"
+    "tijd|tijdstip|tid|czas|zaman|süre|aika|čas|vrijeme|vreme|timp|idő|waktu|thời[ _-]gian|เวลา|زمان|время|час|χρόνος|"
     "時間|时间|時刻|时刻|経過時間|시간|समय|الزمن|الوقت|זמן",
     re.IGNORECASE,
 )

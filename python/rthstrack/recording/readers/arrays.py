@@ -148,7 +148,9 @@ def collect(
     clocks: list[Clock] = []
     stated = list(statements)
     said = list(notes)
+    matrices = 0
     for name, array, unit in entries:
+        matrices += array.ndim > 1 and not array.dtype.names
         rate = rate_of(name, array) if array.size == 1 and array.dtype.kind in "iuf" else None
         if rate is not None:
             stated.append(RateStatement(f"'{name}'", rate, None, states_unit(name)))
@@ -156,4 +158,6 @@ def collect(
             clocks.append(clock(name, array, len(series)))
         else:
             series += columns(name, array, unit, said)
-    return Contents(form, tuple(series), tuple(clocks), tuple(stated), tuple(said))
+    # The columns of one matrix have no names.
+    nameless = matrices == 1 and len({one.name.split("[")[0] for one in series}) == 1
+    return Contents(form, tuple(series), tuple(clocks), tuple(stated), tuple(said), nameless)

@@ -54,7 +54,42 @@ def _statement(key: str, mark: str) -> re.Pattern[str]:
 
 def read(path: Path, part: Part = WHOLE) -> Contents:
     """Reads a text file: comma, semicolon, tab, bar or blanks between columns, with any preamble."""
-    return contents_of(path.read_bytes(), part)
+    content = path.read_bytes()
+    found = contents_of(content, part)
+    apart = [one.path for one in found.series if _holds_thousands(one.values)]
+    if not apart:
+        return found
+    mark = "," if "decimal comma" in found.format else "."
+    group = rb"(?<![\d.,])([-+]?[1-9]\d{0,2})" + re.escape(mark).encode() + rb"(?=\d{3}(?![\d.,]))"
+    joined = contents_of(re.sub(group, rb"\1", content), part)
+    whole = [
+        np.array_equal(one.values, np.rint(one.values), equal_nan=True) for one in joined.series if one.path in apart
+    ]
+    # One with a decimal or two is none of whole thousands.
+    if len(whole) != len(apart) or not all(whole):
+        return found
+    words = f"'{apart[0]}' has whole numbers and others of three decimals: '{mark}' was taken to set thousands apart"
+    return replace(joined, notes=(*joined.notes, Said(words, "thousands")))
+
+
+def _holds_thousands(values: NDArray[np.float64]) -> bool:
+    """Whether numbers such as 567 and 1.234, and no 0.567 or 1234, show that the mark parts thousands."""
+    for some in (values[:_LOOKED_AT], values):
+        some = some[np.isfinite(some)]
+        size = np.abs(some)
+        odd = size != np.rint(size)
+        n_odd = int(np.count_nonzero(odd))
+        if not n_odd or size.max() >= 1000 or size[odd].min() < 1:
+            return False
+    thousandths = 1e3 * size[odd]
+    fine = np.abs(thousandths / 10 - np.rint(thousandths / 10)) > 1e-3
+    return bool(
+        len(some) >= _LEAST
+        and np.abs(thousandths - np.rint(thousandths)).max() < 1e-6
+        and 2 * np.count_nonzero(fine) > n_odd
+        and np.count_nonzero(~odd & (size >= 1)) > len(some) // 10
+        and n_odd > len(some) // 20
+    )
 
 
 def contents_of(content: bytes, part: Part = WHOLE) -> Contents:
@@ -103,6 +138,8 @@ def contents_of(content: bytes, part: Part = WHOLE) -> Contents:
     return Contents(form, tuple(series), tuple(clocks), tuple(statements), tuple(notes), nameless)
 
 
+# Of fewer numbers nothing is concluded; so many show most columns that hold no thousands.
+_LEAST, _LOOKED_AT = 50, 1000
 # Older ways to spell names outside western Europe.
 _CODE_PAGES = ("GB18030", "Shift-JIS", "EUC-KR", "Windows-1251", "Big5")
 
