@@ -10,8 +10,9 @@ import pytest
 import scipy.io
 
 from rthstrack.recording import propose_pair, read_recording
+from rthstrack.recording.chosen import read_chosen
 from rthstrack.recording.readers import matlab
-from rthstrack.said import Said
+from rthstrack.said import Said, coded
 from test_readers_damage import read_or_error
 
 # Its import sets an option that newer pandas deprecates.
@@ -166,14 +167,36 @@ def test_what_holds_objects_is_walked(tmp_path: Path, version: str) -> None:
     assert recording.channels[0].path == "run.log.time"
 
 
-def test_a_date_of_each_row_becomes_seconds_since_the_first(tmp_path: Path) -> None:
+def test_dates_of_each_row_are_its_time(tmp_path: Path) -> None:
     # Milliseconds since 1970, and what a double cannot hold of them.
     stamps = 1.6e12 + 1e3 * T[:, None] + 1j * 0.0
     filed = MatlabOpaque({"data": stamps, "tz": text(""), "fmt": text("")}, "datetime")
     path = written(tmp_path, when=filed, target=TARGET[:, None], measured=MEASURED[:, None])
-    recording = read_recording(path, rate_hz=50)
-    assert np.abs(recording["when"].values - T).max() < 1e-3
-    assert recording["when"].values[0] == 0.0
+    checked(read_recording(path))
+
+
+@pytest.mark.parametrize("version", ["v7", "v7.3"])
+@pytest.mark.parametrize("late_ms", [60.0, 60.0 + 60j])
+def test_channels_with_dates_of_their_own_are_put_on_one_clock(tmp_path: Path, version: str, late_ms: complex) -> None:
+    def dates(late_ms: complex) -> MatlabOpaque:
+        stamps = 1.7092944e12 + 1e3 * T[:, None] + late_ms
+        return MatlabOpaque({"data": stamps, "tz": text(""), "fmt": text("")}, "datetime")
+
+    path = written(
+        tmp_path,
+        version,
+        t_target=dates(0j),
+        target=TARGET[:, None],
+        t_measured=dates(late_ms),
+        measured=MEASURED[:, None],
+    )
+    recording = read_chosen(path).recording
+    (told,) = [note for note in map(coded, recording.notes) if note.code == "one_clock"]
+    late_s = (late_ms.real + late_ms.imag) / 1e3
+    assert told.values[0] == pytest.approx(late_s, abs=1e-9)
+    n = round(50 * late_s)
+    assert recording["target"].values == pytest.approx(TARGET[n:], abs=1e-12)
+    assert recording["measured"].values == pytest.approx(MEASURED[:-n], abs=1e-12)
 
 
 def test_what_stays_unreadable_names_the_object_and_what_to_export(

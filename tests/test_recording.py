@@ -595,6 +595,12 @@ def test_the_records_of_the_machine_have_the_pair_that_is_known(shared: Path) ->
         "Tiempo",
         "Tempo",
         "Laufzeit [s]",
+        "Zeit / s",
+        "Время, с",
+        "時間 [秒]",
+        "Süre",
+        "Elapsed",
+        "Zeitstempel",
     ],
 )
 def test_time_is_told_by_its_name_in_any_language_or_by_its_unit(tmp_path: Path, name: str) -> None:
@@ -606,6 +612,84 @@ def test_time_is_told_by_its_name_in_any_language_or_by_its_unit(tmp_path: Path,
         return
     rows = "".join(f"{i % 7};{i % 3};{i % 5}\n" for i in range(20))
     assert read_recording(written(tmp_path, f"{name};a;b\n{rows}")).rate_hz is None
+
+
+@pytest.mark.parametrize(
+    ("page", "time", "target", "measured"),
+    [
+        ("gb18030", "时间(s)", "目标位移", "实测位移"),
+        ("shift_jis", "時間", "目標変位", "計測変位"),
+        ("euc_kr", "시간", "목표", "측정"),
+        ("cp1251", "Время", "Задание", "Факт"),
+    ],
+)
+def test_names_in_an_older_code_page_are_read(tmp_path: Path, page: str, time: str, target: str, measured: str) -> None:
+    rows = "".join(f"{i / 50},{i % 3},{i % 5}\n" for i in range(20))
+    (tmp_path / "file.csv").write_bytes(f"{time},{target},{measured}\n{rows}".encode(page))
+    recording = read_recording(tmp_path / "file.csv")
+    assert recording.rate_hz == 50.0
+    assert [channel.name for channel in recording.channels] == [time, target, measured]
+
+
+@pytest.mark.parametrize("mark", [",", "."])
+def test_thousands_of_whole_numbers_are_told_from_three_decimals(tmp_path: Path, mark: str) -> None:
+    values = [(37 * i * i) % 1999 - 999 for i in range(200)]
+    point = "." if mark == "," else ","
+    rows = [f"{i / 50:.2f}".replace(".", point) + f"\t{f'{v:,d}'.replace(',', mark)}\n" for i, v in enumerate(values)]
+    recording = read_recording(written(tmp_path, "Time\ta\n" + "".join(rows)))
+    assert list(recording["a"].values) == values
+    assert recording.rate_hz == 50.0
+    # Eighths, and what a workbook holds, are none.
+    rows = [f"{i / 50:.2f}\t{100 + i % 9 / 8:g}\n" for i in range(200)]
+    assert read_recording(written(tmp_path, "Time\ta\n" + "".join(rows)))["a"].values.max() == 101
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("a.tdm", b'<?xml version="1.0"?>\n<usi:tdm version="1.0">\n', "TDM to TDMS"),
+        ("a.mf4", b"MDF     4.10    " + bytes(64), "export it as MAT or CSV"),
+        ("a.csv", b"<!DOCTYPE html><html>404</html>", "a web page in place of the file"),
+        ("a.csv", b'{"time": [0, 1]}', "JSON"),
+    ],
+)
+def test_what_is_no_recording_says_what_to_do(tmp_path: Path, name: str, content: bytes, said: str) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(RecordingError, match=said):
+        read_recording(tmp_path / name)
+
+
+def test_the_first_column_of_a_matrix_alone_is_its_time_where_it_rises_evenly(tmp_path: Path) -> None:
+    matrix = np.column_stack([np.arange(100) / 50, np.sin(np.arange(100)), np.cos(np.arange(100))])
+    np.save(tmp_path / "a.npy", matrix)
+    np.save(tmp_path / "b.npy", matrix.T)
+    np.savez(tmp_path / "c.npz", data=matrix)
+    for name in ("a.npy", "b.npy", "c.npz"):
+        assert read_recording(tmp_path / name).rate_hz == 50.0
+
+
+def test_names_in_latin_1_stay_as_they_are(tmp_path: Path) -> None:
+    rows = "".join(f"{i / 50},{i % 3},{i % 5}\n" for i in range(20))
+    (tmp_path / "file.csv").write_bytes(f"Zeit,Prüfkörper Sollweg (µm),Größe\n{rows}".encode("latin-1"))
+    recording = read_recording(tmp_path / "file.csv")
+    assert [channel.name for channel in recording.channels] == ["Zeit", "Prüfkörper Sollweg (µm)", "Größe"]
+
+
+def test_units_in_other_scripts_are_a_row_of_units(tmp_path: Path) -> None:
+    rows = "".join(f"{i / 50},{i % 3},{i % 5}\n" for i in range(20))
+    recording = read_recording(written(tmp_path, f"时间,目标,测量\n秒,毫米,毫米\n{rows}"))
+    assert recording.rate_hz == 50.0
+    assert [(c.name, c.unit) for c in recording.channels] == [("时间", "秒"), ("目标", "毫米"), ("测量", "毫米")]
+
+
+def test_acquisitions_under_one_repeated_head_are_blocks(tmp_path: Path) -> None:
+    rows = ["".join(f"{i / 50},{i % 3},{i % 5}\n" for i in range(n)) for n in (20, 30)]
+    path = written(tmp_path, f"Time,a,b\n{rows[0]}\nTime,a,b\n{rows[1]}")
+    assert [len(read_recording(path, block=n).channels[0].values) for n in (1, 2)] == [20, 30]
+    # A head that a page repeats does not part the rows.
+    whole = rows[1].splitlines(keepends=True)
+    path = written(tmp_path, "Time,a,b\n" + "".join(whole[:15]) + "Time,a,b\n" + "".join(whole[15:]))
+    assert len(read_recording(path).channels[0].values) == 30
 
 
 def test_a_git_lfs_pointer_is_named(tmp_path: Path) -> None:

@@ -64,8 +64,8 @@ Delta_X\t0.010000\t0.010000
 """
 
 
-def lvm(path: Path, kind: str, *, second: str = "0.0", x0: str = "5.0000000000000000E-2") -> Path:
-    columns = {"Multi": [T, target(T), LATE, measured(T)], "One": [T, target(T), measured(T)]}
+def lvm(path: Path, kind: str, *, second: str = "0.0", x0: str = "5.0000000000000000E-2", own: Any = LATE) -> Path:
+    columns = {"Multi": [T, target(T), own, measured(T)], "One": [T, target(T), measured(T)]}
     names = {"Multi": "X_Value\ttarget\tX_Value\tmeasured", "One": "X_Value\ttarget\tmeasured"}
     rows = np.column_stack(columns.get(kind, [target(T), measured(T)]))
     text = LVM.format(kind=kind, second=second, x0=x0) + names.get(kind, "target\tmeasured") + "\tComment\n"
@@ -144,6 +144,18 @@ SHIFTED: dict[str, Callable[[Path], Path]] = {
     "lvm, a time column each": lambda p: lvm(p / "a.lvm", "Multi"),
     "lvm, one time column": lambda p: lvm(p / "a.lvm", "One"),
     "lvm, none": lambda p: lvm(p / "a.lvm", "No"),
+    "lvm, a time column each and another time of day": lambda p: lvm(
+        p / "a.lvm", "Multi", second="0.05", x0="0.0000000000000000E+0", own=T
+    ),
+    "csv, times behind their channels": lambda p: table(
+        p / "a.csv", ["measured", "Time", "target", "Time"], [measured(T), LATE, target(T), T]
+    ),
+    "csv, dates behind their channels": lambda p: table(
+        p / "a.csv", ["measured", "when", "target", "when then"], [measured(T), stamps(LATE), target(T), stamps(T)]
+    ),
+    "csv, dates side by side": lambda p: table(
+        p / "a.csv", ["t_target", "t_measured", "target", "measured"], [stamps(T), stamps(LATE), target(T), measured(T)]
+    ),
     "lvm, another time of day": lambda p: lvm(p / "a.lvm", "No", second="0.05", x0="0.0000000000000000E+0"),
 }
 
@@ -165,6 +177,10 @@ FASTER: dict[str, Callable[[Path], Path]] = {
     ),
     "hdf5": lambda p: hdf5(
         p / "a.h5", {"ctrl/time": T, "ctrl/target": target(T), "daq/time": FAST, "daq/measured": measured(FAST)}
+    ),
+    "mat, fs": lambda p: mat(
+        p / "a.mat",
+        {"cmd": {"fs": 100.0, "data": target(T)}, "fbk": {"fs": 250.0, "t0": 0.05, "data": measured(FAST)}},
     ),
     "tdms": lambda p: tdms(
         p / "a.tdms",
@@ -236,6 +252,44 @@ def test_another_kind_of_time_between_the_channels_is_asked_about(tmp_path: Path
         read_chosen(path)
     assert caught.value.code == "whose_time"
     assert judged(path, time="Time")[0] == pytest.approx(12, abs=1e-4)
+
+
+def test_dates_of_one_channel_and_seconds_of_another_are_no_common_clock(tmp_path: Path) -> None:
+    columns = [stamps(T), target(T), LATE, measured(T)]
+    path = table(tmp_path / "a.csv", ["when", "target", "Time", "measured"], columns)
+    with pytest.raises(RecordingError, match="may be of the same samples or each of another channel") as caught:
+        read_chosen(path)
+    assert caught.value.code == "whose_time"
+    # Side by side they are of the same samples.
+    path = table(tmp_path / "b.csv", ["when", "Time", "target", "measured"], [stamps(T), T, target(T), measured(T)])
+    assert judged(path)[0] == pytest.approx(12, abs=1e-4)
+
+
+def test_one_time_chosen_for_all_is_said_to_pass_over_a_channels_own(tmp_path: Path) -> None:
+    path = SHIFTED["csv, by name"](tmp_path)
+    notes = [coded(note) for note in read_chosen(path, time="t_target").recording.notes]
+    (told,) = [note for note in notes if note.code == "time_not_followed"]
+    assert told.values == pytest.approx([0.05])
+    assert "'measured' may have time column 't_measured', which begins 50 ms later" in told
+
+
+def test_times_in_other_groups_that_contradict_each_other_are_told(tmp_path: Path) -> None:
+    other = {"a": {"time": T, "load": T**2}, "c": {"time": T / 2, "acc": T**2}}
+    path = mat(tmp_path / "a.mat", {**other, "b": {"target": target(T), "measured": measured(T)}})
+    with pytest.raises(RecordingError, match=r"'a.time' says 100 Hz, but time column 'c.time' 200 Hz"):
+        read_chosen(path)
+
+
+def test_the_files_rate_is_that_of_channels_without_a_time(tmp_path: Path) -> None:
+    spectrum = {"T": np.linspace(0.05, 4, 80), "Sa": np.cos(np.arange(80)), "Sd": np.sin(np.arange(80))}
+    path = mat(tmp_path / "a.mat", {**spectrum, "fs": 100.0, "target": target(T), "measured": measured(T)})
+    assert judged(path)[0::2][:2] == (pytest.approx(12, abs=1e-4), 100.0)
+
+
+def test_rates_of_labviews_channels_are_each_its_own(tmp_path: Path) -> None:
+    path = lvm(tmp_path / "a.lvm", "No", x0="0.0")
+    path.write_text(path.read_text().replace("Delta_X\t0.010000\t0.010000", "Delta_X\t0.010000\t0.020000"))
+    assert [c.time.rate_hz for c in read_recording(path).channels if c.time] == [100.0, 50.0]
 
 
 def test_channels_without_a_time_in_common_are_refused(tmp_path: Path) -> None:

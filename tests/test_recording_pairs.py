@@ -13,6 +13,7 @@ from field_motion import GAIN, measured, table, target
 from rthstrack.cli import main
 from rthstrack.errors import ChannelError
 from rthstrack.recording import Channel, Recording, propose_pair
+from rthstrack.recording.chosen import read_chosen
 from rthstrack.units import units_from_names
 
 if TYPE_CHECKING:
@@ -119,6 +120,16 @@ def test_what_was_not_compared_is_not_called_unlike() -> None:
 
 
 # ---- copies ----
+
+
+def test_a_copy_in_single_precision_is_a_copy(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", time=T, target=target(T), feedback=target(T).astype(np.float32))
+    with pytest.raises(ChannelError, match="'feedback' is an exact copy of 'target'"):
+        read_chosen(tmp_path / "a.npz")
+    # What a sensor adds, however little, is a measurement.
+    noise = 1e-4 * np.sin(np.arange(len(T)) ** 2)
+    np.savez(tmp_path / "a.npz", time=T, target=target(T), feedback=target(T) + noise)
+    assert read_chosen(tmp_path / "a.npz").pairs == [("target", "feedback")]
 
 
 def test_an_exact_copy_is_never_proposed() -> None:

@@ -10,6 +10,7 @@ import pytest
 from field_motion import GAIN, measured, table, target
 from rthstrack.cli import main
 from rthstrack.errors import RecordingError, SettingError
+from rthstrack.recording import read_recording
 from rthstrack.recording.chosen import read_chosen
 from rthstrack.said import coded
 
@@ -70,6 +71,39 @@ def test_where_it_can_be_either_it_is_asked(tmp_path: Path, name: str, stamps: A
         read_chosen(path)
     assert caught.value.code == "time_unit"
     assert read_chosen(path, units={name: "s"} if name == "Time (ms)" else {name: "ms"}).rate_hz > 9
+
+
+def test_a_step_without_a_unit_that_makes_no_rigs_rate_is_asked_about(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", dt=10.0, target=T, measured=T)
+    (tmp_path / "a.csv").write_text("Sampling period: 10\ntarget,measured\n1,2\n2,3\n3,5\n")
+    for name in ("a.npz", "a.csv"):
+        with pytest.raises(RecordingError, match=r"states no unit: in s .* 0\.1 Hz, in ms .* 100 Hz") as caught:
+            read_recording(tmp_path / name)
+        assert caught.value.code == "time_unit"
+        assert read_recording(tmp_path / name, rate_hz=100).rate_hz == 100
+    (tmp_path / "a.csv").write_text("Sampling period: 10 s\ntarget,measured\n1,2\n2,3\n3,5\n")
+    assert read_recording(tmp_path / "a.csv").rate_hz == 0.1
+
+
+@pytest.mark.parametrize(("bound", "first"), [(2**16, 62000), (2**32, 2**32 - 3000), (2**16, -2000)])
+def test_a_counter_that_begins_anew_is_counted_on(tmp_path: Path, bound: int, first: int) -> None:
+    low = -bound // 2 if first < 0 else 0
+    ms = low + (first - low + 10 * I + (bound // 2 if first < 0 else 0)) % bound
+    assert (np.diff(ms) < 0).sum() == 1
+    recording = read_recording(written(tmp_path, "Time (ms)", ms, "%d"))
+    assert recording.rate_hz == 100.0
+    assert "begins anew at" in recording.rate_source
+    # A second acquisition that begins at zero is no counter.
+    with pytest.raises(RecordingError, match="1 step"):
+        read_recording(written(tmp_path, "Time (ms)", 10 * (I % 300), "%d"))
+
+
+def test_dates_that_are_rounded_say_which_rates_they_allow(tmp_path: Path) -> None:
+    rows = "".join(f"10:00:{i // 100:02d},{i % 7},{i % 5}\n" for i in range(800))
+    (tmp_path / "a.csv").write_text("Time,target,measured\n" + rows)
+    (told,) = [note for note in map(coded, read_recording(tmp_path / "a.csv").notes) if note.code == "rounded_time"]
+    low_hz, high_hz = told.values
+    assert low_hz < 100 < high_hz
 
 
 def test_the_verdict_says_that_the_unit_is_a_guess(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -173,6 +207,16 @@ def test_stated_units_are_converted_to_those_of_target_and_said(
     assert recording[names[1]].values == pytest.approx(factors[0] * measured(T), rel=1e-12, abs=1e-15)
     assert recording[names[1]].unit == recording[names[0]].unit
     assert "converted" in [coded(note).code for note in recording.notes]
+
+
+@pytest.mark.parametrize("form", ["{} / {}", "{}, {}", "{} {}"])
+def test_a_unit_stands_behind_a_slash_a_comma_or_a_blank_too(tmp_path: Path, form: str) -> None:
+    names = ["Time", form.format("target", "mm"), form.format("measured", "cm")]
+    path = table(tmp_path / "a.tsv", names, [T, target(T), measured(T)])
+    path.write_text(path.read_text().replace(", ", "\x00").replace(",", "\t").replace("\x00", ", "))
+    recording = read_chosen(path, targets=["target"], measured=["measured"]).recording
+    assert [c.unit for c in recording.channels] == [None, "mm", "mm"]
+    assert recording.channels[2].values == pytest.approx(10 * measured(T), abs=1e-6)
 
 
 def test_a_channel_that_is_scaled_is_not_converted(tmp_path: Path) -> None:

@@ -46,19 +46,23 @@ _WIDE_BRACKETS = str.maketrans("（）［］【】", "()[][]")
 
 
 def split_unit(name: str) -> tuple[str, str | None]:
-    """A channel's name without its unit, and that: `Disp (mm)`, `Disp [mm]`, `Disp, mm`, `Disp/mm`, `disp_mm`."""
+    """A name without its unit, and that: `Disp (mm)`, `Disp [mm]`, `Disp, mm`, `Disp / mm`, `Disp mm`, `disp_mm` ..."""
     name = name.translate(_WIDE_BRACKETS)
     found = re.fullmatch(r"(.*\S)\s*\[([^\[\]]{1,16})\]", name)
     # An index ([:,0]) is no unit.
     if found and re.search(r"[^\W\d_]|[%°-]", found[2]):
         return found[1], found[2].strip()
-    found = re.fullmatch(r"(.*\S)\s*\(([^()]{1,16})\)", name) or re.fullmatch(r"(.*\S)\s*,\s+(\S{1,8})", name)
+    found = re.fullmatch(r"(.*\S)\s*\(([^()]{1,16})\)", name)
+    found = found or re.fullmatch(r"(.*\S)(?:\s*,|\s+/)\s+(\S{1,8})", name)
     if found and is_unit(found[2]):
         return found[1], found[2].strip()
     stem, _, suffix = name.partition("/")
     # A single letter, in and min are rather the last part of a path; before m/s^2 stands a blank.
     if stem and len(suffix) > 1 and suffix not in ("in", "min") and is_unit(suffix) and not is_unit(stem.split()[-1]):
         return stem.rstrip(), suffix.strip()
+    found = re.fullmatch(r"(.*\S)\s+(\S{2,4})", name)
+    if found and is_unit_suffix(found[2]):
+        return found[1], found[2]
     stem, _, suffix = name.rpartition("_")
     if stem and is_unit_suffix(suffix):
         return stem, suffix

@@ -6,6 +6,9 @@ use crate::line::{Lines, each_field, is_blank, uncommented};
 /// A broken row is left out behind the last whole one only: more of them than this are no footer.
 const LONGEST_FOOTER: usize = 20;
 
+/// So many rows show whether the first column rises.
+const ROWS_COMPARED: usize = 50;
+
 /// Lines that are passed over: their first and last number, and where they begin and end.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Stray {
@@ -71,7 +74,10 @@ pub(crate) fn split(text: &[u8], dialect: &Dialect) -> Option<Vec<Block>> {
                 let continues = above.is_none()
                     && blocks.last().is_some_and(|block| {
                         let same = width == block.width;
-                        let repeated = || gap.iter().all(|one| is_repeated(one, text, block));
+                        let repeated = || {
+                            gap.iter().all(|one| is_repeated(one, text, block))
+                                && !begins_anew(bytes, text, block, dialect)
+                        };
                         let remarks =
                             || width > 1 && !gap.iter().any(|one| matches!(one.class, Class::Words { names: true }));
                         same && (gap.is_empty() || repeated() || remarks())
@@ -156,6 +162,21 @@ fn is_repeated(line: &Line<'_>, text: &[u8], block: &Block) -> bool {
     let plain = trimmed(line.bytes);
     let head = Lines { bytes: &text[block.head.0..block.start.0], at: 0 };
     is_page(plain) || head.into_iter().any(|(_, above)| trimmed(above) == plain)
+}
+
+/// Whether a row under a repeated head is the first of another acquisition: what rose in the first column falls back.
+fn begins_anew(row: &[u8], text: &[u8], block: &Block, dialect: &Dialect) -> bool {
+    let first = |line: &[u8]| {
+        let mut found = None;
+        each_field(line, dialect.delimiter, |field| {
+            found = found.or_else(|| Some(crate::number::parse(&crate::line::unquoted(field), dialect.point)));
+        });
+        found.flatten()
+    };
+    let rows = Lines { bytes: &text[..block.end.0], at: block.start.0 };
+    let rising: Vec<f64> = rows.take(ROWS_COMPARED).filter_map(|(_, line)| first(line)).collect();
+    let whole = rising.len() > 2 && rising.windows(2).all(|pair| pair[0] < pair[1]);
+    whole && first(row).is_some_and(|value| value < rising[1])
 }
 
 fn trimmed(line: &[u8]) -> &[u8] {

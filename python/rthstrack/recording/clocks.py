@@ -12,7 +12,7 @@ import numpy as np
 
 from rthstrack.errors import RecordingError
 from rthstrack.recording.names import role, words
-from rthstrack.recording.readers.stamps import Uniform
+from rthstrack.recording.readers.stamps import Irregular, Uniform
 from rthstrack.recording.recording import OwnTime, Recording, frozen
 from rthstrack.said import Said
 
@@ -39,11 +39,13 @@ _OF_TIME = {"t", "time", "times", "stamp", "timestamp", "x", "value", "values", 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Timelines:
-    """`of`: the time column of each series, None where it has none; `main`: the columns of most of them."""
+    """`of`: the time column of each series, None where it has none; `main`: the columns of most of them; `paths`: those
+    of the series."""
 
     of: tuple[TimeColumn | None, ...]
     main: tuple[TimeColumn, ...]
     notes: tuple[Said, ...] = ()
+    paths: tuple[str, ...] = ()
 
 
 def timelines(contents: Contents, columns: Sequence[TimeColumn], file: str, *, given: bool = False) -> Timelines:
@@ -57,23 +59,30 @@ def timelines(contents: Contents, columns: Sequence[TimeColumn], file: str, *, g
     of: list[tuple[TimeColumn, ...]] = []
     counted: dict[tuple[TimeColumn, ...], int] = {}
     places = {column.index for column in columns}
+    behind = len(set(blocks.values())) > 1 and min(places) > 0 and max(places) > len(contents.series) - 1.5
     for index, series in enumerate(contents.series):
-        own = () if index in places else _nearest(series, index, columns, blocks)
+        own = () if index in places else _nearest(series, index, columns, blocks, behind=behind)
+        # Dates beside a better time are of the same samples.
+        own = tuple(column for column in own if not column.is_clock) or own
         of.append(own)
-        if own:
-            counted[own] = counted.get(own, 0) + len(series.values)
+        counted[own] = counted.get(own, 0) + len(series.values) * (index not in places)
+    untimed = counted.pop((), 0)
     if not counted:
         return Timelines((None,) * len(contents.series), tuple(columns))
     main = max(counted, key=counted.__getitem__)
+    if any(s.channel is None for s in contents.statements) and untimed > counted[main]:
+        # The file's rate is that of the channels without a time.
+        main = ()
     notes: list[Said] = []
     chosen = {}
     for group in counted:
         chosen[group] = group[0]
         uniform = [column for column in group if isinstance(column.examine(), Uniform)]
         if uniform:
-            chosen[group] = uniform[0]
+            chosen[group] = _unless_contradicted(uniform)
             notes += _contradictions(uniform, of, file, given=given)
-    return Timelines(tuple(chosen.get(group) for group in of), main, tuple(notes))
+    paths = tuple(series.path for series in contents.series)
+    return Timelines(tuple(chosen.get(group) for group in of), main, tuple(notes), paths)
 
 
 def _blocks(contents: Contents, columns: Sequence[TimeColumn]) -> dict[float, int]:
@@ -95,8 +104,9 @@ def _last(path: str) -> list[str]:
 
 
 def _nearest(
-    series: Series, index: int, columns: Sequence[TimeColumn], blocks: dict[float, int]
+    series: Series, index: int, columns: Sequence[TimeColumn], blocks: dict[float, int], *, behind: bool
 ) -> tuple[TimeColumn, ...]:
+    """behind: times stand behind their channels, as the table ends with one and does not begin with one."""
     alike = [column for column in columns if len(column.stamps) == len(series.values)]
     if len(alike) < 2:
         return tuple(alike)
@@ -118,9 +128,30 @@ def _nearest(
     best = max(map(named, alike))
     if best:
         alike = [column for column in alike if named(column) == best]
+    homes = [_parents(column.path) for column in alike]
+    if any(home != homes[0] for home in homes) and not any(home == own[: len(home)] for home in homes):
+        # In groups beside the channel's, none is nearer than another.
+        return tuple(alike)
     before = [blocks[column.index] for column in alike if column.index < index]
-    block = max(before) if before else min(blocks[column.index] for column in alike)
+    after = [blocks[column.index] for column in alike if column.index > index]
+    follows = bool(after) if behind else not before
+    block = min(after) if follows else max(before)
     return tuple(column for column in alike if blocks[column.index] == block)
+
+
+def _unless_contradicted(uniform: Sequence[TimeColumn]) -> TimeColumn:
+    """The first of time columns that speak of the same samples, useless where another says another rate."""
+    first = uniform[0].examine()
+    assert isinstance(first, Uniform)
+    for other in uniform[1:]:
+        verdict = other.examine()
+        assert isinstance(verdict, Uniform)
+        if abs(verdict.rate_hz / first.rate_hz - 1) > _ALIKE:
+            problem = (
+                f"says {first.rate_hz:g} Hz, but {other.what} {verdict.rate_hz:g} Hz, and nothing tells which holds"
+            )
+            return replace(uniform[0], verdicts=[Irregular(problem, False, math.nan)])
+    return uniform[0]
 
 
 def _contradictions(
@@ -133,6 +164,8 @@ def _contradictions(
     for other in uniform[1:]:
         verdict = other.examine()
         assert isinstance(verdict, Uniform)
+        if abs(verdict.rate_hz / first.rate_hz - 1) > _ALIKE:
+            continue
         apart_s = verdict.origin_s - first.origin_s
         if abs(apart_s) * first.rate_hz < _APART:
             continue
@@ -155,6 +188,26 @@ def _contradictions(
     return notes
 
 
+def not_followed(own: Timelines, chosen: TimeColumn) -> list[Said]:
+    """Which channels' own times say otherwise than the one that the user chose for all."""
+    said = []
+    first = chosen.examine()
+    for other in dict.fromkeys(column for column in own.of if column is not None and column.index != chosen.index):
+        verdict = other.examine()
+        if other.is_clock or not (isinstance(first, Uniform) and isinstance(verdict, Uniform)):
+            continue
+        apart_s = verdict.origin_s - first.origin_s
+        if abs(verdict.rate_hz / first.rate_hz - 1) <= _ALIKE and abs(apart_s) * first.rate_hz < _APART:
+            continue
+        names = ", ".join(f"'{p}'" for p, column in zip(own.paths, own.of, strict=True) if column is other)
+        words = (
+            f"{chosen.what} was followed for all channels, as asked, though {names} may have {other.what}, which "
+            f"begins {1e3 * abs(apart_s):.6g} ms {'later' if apart_s > 0 else 'earlier'}, at {verdict.rate_hz:.6g} Hz"
+        )
+        said.append(Said(words, "time_not_followed", [apart_s]))
+    return said
+
+
 def own_times(contents: Contents, lines: Timelines, rate: Rate, *, given: bool) -> list[OwnTime | None]:
     """The clock of every channel, None for all where there is but one.
 
@@ -164,7 +217,8 @@ def own_times(contents: Contents, lines: Timelines, rate: Rate, *, given: bool) 
     from_column = not given and (rate.by_column or rate.hz is None)
     main = next((column for column in lines.main if isinstance(column.examine(), Uniform)), None)
     length = len(main.stamps) if main is not None and from_column else None
-    seen: dict[float, OwnTime] = {}
+    mixed = len({column.is_clock for column in lines.of if column is not None}) > 1
+    seen: dict[TimeColumn, OwnTime] = {}
     found: list[OwnTime] = []
     for series, column in zip(contents.series, lines.of, strict=True):
         stated = of_channel.get(series.path)
@@ -175,9 +229,11 @@ def own_times(contents: Contents, lines: Timelines, rate: Rate, *, given: bool) 
             source = stated.source if stated is not None else rate.source
             found.append(OwnTime(source, hz, series.start_s))
         elif column is not None and (not given or _agrees(column, rate)):
-            if column.index not in seen:
-                seen[column.index] = _of_column(column, rate if given or column in lines.main else None)
-            found.append(seen[column.index])
+            if column not in seen:
+                seen[column] = _of_column(column, rate if given or column in lines.main else None)
+                if mixed and column.is_clock:
+                    seen[column] = replace(seen[column], kind="dates")
+            found.append(seen[column])
         elif length is not None and len(series.values) != length:
             assert main is not None
             problem = f"{main.what} has {length} samples, this channel {len(series.values)}: its own time is not known"

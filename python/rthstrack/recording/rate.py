@@ -11,9 +11,10 @@ import numpy as np
 
 from rthstrack.errors import RecordingError
 from rthstrack.recording.names import FILLERS, role, words
+from rthstrack.recording.readers.arrays import tidy
 from rthstrack.recording.readers.stamps import Irregular, Uniform, examine
 from rthstrack.recording.recording import select
-from rthstrack.recording.time_units import SECONDS, CountedIn, counted_in, rounded_step
+from rthstrack.recording.time_units import DOUBTED_SLOW_HZ, SECONDS, CountedIn, counted_in, rounded_step, unwrapped
 from rthstrack.said import Said
 from rthstrack.units import seconds_in, split_unit
 
@@ -75,7 +76,16 @@ _HINTS = re.compile(r"tick|clock|count|date|stamp", re.IGNORECASE)
 _TIME_NAMES = re.compile(
     r"t|times?|tout|zeit|messzeit|temps|tiempo|tempo|x[_ ]values?|time[ _-]?stamps?|time[ _-]?(?:axis|vector|base|\d+)|"
     r"(?:elapsed|running|relative|test|total|run|sample|measurement|record|simulation|sim)[ _-]?time|"
-    "tijd|tid|czas|zaman|aika|čas|время|час|χρόνος|時間|时间|時刻|时刻|経過時間|시간|समय|الزمن|الوقت|זמן",
+    "tijd|tijdstip|tid|czas|zaman|süre|aika|čas|vrijeme|vreme|timp|idő|waktu|thời[ _-]gian|เวลา|زمان|время|час|χρόνος|"
+    "時間|时间|時刻|时刻|経過時間|시간|समय|الزمن|الوقت|זמן",
+    re.IGNORECASE,
+)
+
+
+# Names of time that mean other things too.
+_TIME_OR_ELSE = re.compile(
+    r"(time|zeit)\b.*|(date|datum|fecha)[ _-]?(time|zeit)?|elapsed|duration|dauer|laufzeit|durée|zeitstempel|"
+    "horodatage|seconds|sekunden",
     re.IGNORECASE,
 )
 
@@ -112,7 +122,7 @@ def _time_named(series: Series, unit_s: float | None) -> str:
         return ""
     if _TIME_NAMES.fullmatch(stem):
         return "plainly" if stem != "T" or unit_s is not None else "loosely"
-    if re.match(r"(time|zeit)\b|(date|datum|fecha)[ _-]?(time|zeit)?$", stem, re.IGNORECASE):
+    if _TIME_OR_ELSE.fullmatch(stem):
         return "loosely"
     # t1, t_target, cmd time, but not x_t.
     found = words(stem)
@@ -147,9 +157,12 @@ def _unit(series: Series) -> str | None:
 
 def _numeric_time(index: int, series: Series, how: str = "") -> TimeColumn:
     """A column of numbers as time, in the unit that it states or that fits it best."""
-    unit = counted_in(series.values, seconds_in(_unit(series)))
+    stamps, wraps = unwrapped(series.values)
+    unit = counted_in(stamps, seconds_in(_unit(series)))
     what = f"time column '{series.path}'" + (f" ({how})" if how else "")
-    return TimeColumn(what, series.path, series.values, unit.unit_s, index=index, unit=unit)
+    if wraps:
+        what += f" (begins anew at {wraps:.10g})"
+    return TimeColumn(what, series.path, stamps, unit.unit_s, index=index, unit=unit)
 
 
 def _nameless_times(contents: Contents) -> list[TimeColumn]:
@@ -187,11 +200,13 @@ def _clock_times(clocks: Sequence[Clock]) -> list[TimeColumn]:
     known = [clock for clock in clocks if np.isfinite(clock.seconds).any()]
     earliest = min((clock.first_ns for clock in known if clock.first_ns is not None), default=0)
     found = []
-    for clock in known:
+    for place, clock in enumerate(known):
         late_s = 0.0 if clock.first_ns is None else (clock.first_ns - earliest) / 1e9
         stamps = clock.seconds + late_s if late_s else clock.seconds
         what = f"date-time column '{clock.path}'"
-        found.append(TimeColumn(what, clock.path, stamps, 1.0, is_clock=True, index=clock.after - 0.5))
+        # Two that stand side by side have places of their own, too.
+        index = clock.after - 0.5 + 1e-6 * place
+        found.append(TimeColumn(what, clock.path, stamps, 1.0, is_clock=True, index=index))
     return found
 
 
@@ -223,6 +238,7 @@ def settle(contents: Contents, columns: Sequence[TimeColumn], *, chosen: bool, f
         if rate is None:
             if isinstance(verdict, Irregular):
                 raise RecordingError(f"{clock.what} {verdict.problem}", file=file, advice=_hint(verdict))
+            notes += _rounded_told(clock, verdict)
             rate = Rate(verdict.rate_hz, clock.what, origin_s=verdict.origin_s, by_column=True)
         elif rate.hz is not None:
             notes += _compare_clock(rate, clock, verdict, file)
@@ -315,6 +331,15 @@ def _stated(contents: Contents, file: str) -> Rate | None:
                 file=file,
                 advice="give {rate_hz}",
             )
+    slowest = min(contents.statements, key=lambda s: s.rate_hz, default=None)
+    if slowest is not None and slowest.rate_hz < DOUBTED_SLOW_HZ and not slowest.in_unit:
+        raise RecordingError(
+            f"{slowest.source} states no unit: in s (or Hz) it makes {slowest.rate_hz:g} Hz, in ms (or kHz) "
+            f"{tidy(1e3 * slowest.rate_hz):g} Hz",
+            file=file,
+            code="time_unit",
+            advice="give {rate_hz}",
+        )
     if whole:
         return Rate(whole[0].rate_hz, whole[0].source)
     if not single:
@@ -359,15 +384,22 @@ def _told(columns: Sequence[TimeColumn], stated: Rate | None, file: str) -> Rate
             )
     notes: list[str] = [Said(f"{c.what} {v.problem}; it was not used", "irregular_time") for c, v in irregular]
     notes += _unit_told(column)
-    if first.rounded and first.high_hz - first.low_hz > 2e-3 * first.rate_hz:
-        words = (
-            f"{column.what} is rounded: any rate from {first.low_hz:.6g} to {first.high_hz:.6g} Hz fits it; "
-            "give the rate if you know better"
-        )
-        notes.append(Said(words, "rounded_time", (first.low_hz, first.high_hz)))
-    elif (stated is None or stated.hz is None) and (said := rounded_step(first.rate_hz)) is not None:
+    rounded = _rounded_told(column, first)
+    notes += rounded
+    if not rounded and (stated is None or stated.hz is None) and (said := rounded_step(first.rate_hz)) is not None:
         notes.append(said)
     return Rate(first.rate_hz, column.what, first.start_s, tuple(notes), first.origin_s, by_column=True)
+
+
+def _rounded_told(column: TimeColumn, verdict: Uniform) -> list[Said]:
+    """That rounded stamps leave the rate open, where it is more than a trifle."""
+    if not verdict.rounded or verdict.high_hz - verdict.low_hz <= 2e-3 * verdict.rate_hz:
+        return []
+    words = (
+        f"{column.what} is rounded: any rate from {verdict.low_hz:.6g} to {verdict.high_hz:.6g} Hz fits it; "
+        "give the rate if you know better"
+    )
+    return [Said(words, "rounded_time", (verdict.low_hz, verdict.high_hz))]
 
 
 def _compare_clock(rate: Rate, clock: TimeColumn, verdict: Uniform | Irregular, file: str) -> list[str]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rthstrack.errors import SettingError
-from rthstrack.recording.clocks import clocks_told, own_times, timelines
+from rthstrack.recording.clocks import clocks_told, not_followed, own_times, timelines
 from rthstrack.recording.rate import Rate, doubts, ended, settle, time_columns, with_others
 from rthstrack.recording.readers import read_contents
 from rthstrack.recording.readers.stamps import Uniform
@@ -72,7 +72,8 @@ def recording_from(
     numeric = [column for column in columns if not column.is_clock]
     if resample_hz is not None:
         return resample(contents, file, columns, lines, resample_hz)
-    main = [*lines.main, *(c for c in columns if c.is_clock and numeric)] if time is None else columns
+    clocks = [c for c in columns if c.is_clock and numeric and c not in lines.main]
+    main = [*lines.main, *clocks] if time is None else columns
     if rate_hz is not None:
         rate = Rate(float(rate_hz), "--rate", 0.0, tuple(doubts(contents, columns, rate_hz)))
     else:
@@ -80,6 +81,9 @@ def recording_from(
         length = len(lines.main[0].stamps) if lines.main else 0
         others = {c for c in lines.of if c is not None and c not in lines.main and len(c.stamps) == length}
         rate = with_others(rate, sorted(others, key=lambda c: c.index), file)
+    if time is not None:
+        own = timelines(contents, time_columns(contents, None, file), file, given=True)
+        rate = replace(rate, notes=(*rate.notes, *not_followed(own, columns[0])))
     times = own_times(contents, lines, rate, given=rate_hz is not None)
     places = {int(c.index) for c in columns if not c.is_clock and isinstance(c.examine(), Uniform)}
     channels = channels_of(contents, contents.series, times, places)
@@ -93,7 +97,7 @@ def _lines(
     """Which columns tell whose time; where one ends before the table, it and its channels end there."""
     columns = time_columns(contents, time, file)
     numeric = [column for column in columns if not column.is_clock]
-    lines = timelines(contents, (numeric or columns) if time is None else [], file, given=given)
+    lines = timelines(contents, columns if time is None else [], file, given=given)
     ends = {column.index: len(ended(column.stamps)) for column in numeric}
     if time is not None or all(ends[column.index] in (0, len(column.stamps)) for column in numeric):
         return contents, columns, lines
@@ -104,5 +108,4 @@ def _lines(
             series[i] = replace(series[i], values=series[i].values[:last])
     contents = replace(contents, series=tuple(series))
     columns = time_columns(contents, None, file)
-    numeric = [column for column in columns if not column.is_clock]
-    return contents, columns, timelines(contents, numeric or columns, file, given=given)
+    return contents, columns, timelines(contents, columns, file, given=given)

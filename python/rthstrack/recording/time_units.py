@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 # What a rig's rates and the length of its records are taken to be.
 _SLOWEST_HZ, _FASTEST_HZ, _SHORTEST_S = 10.0, 20e3, 1.0
 # A stated unit is doubted only beyond these.
-_DOUBTED_SLOW_HZ, _DOUBTED_FAST_HZ = 1.0, 50e3
+DOUBTED_SLOW_HZ, _DOUBTED_FAST_HZ = 1.0, 50e3
 _FASTEST_KNOWN_HZ = 2e5
 _LOOKED_AT = 4096
 _DAY_S = 86_400.0
@@ -62,7 +62,7 @@ def counted_in(stamps: NDArray[np.float64], stated_s: float | None) -> CountedIn
     hz = 1 / step
     # In seconds nobody writes whole numbers only, unless the rate is low.
     whole = bool(np.all(sound == np.rint(sound)))
-    if _FASTEST_KNOWN_HZ >= hz >= (_SLOWEST_HZ if whole else _DOUBTED_SLOW_HZ):
+    if _FASTEST_KNOWN_HZ >= hz >= (_SLOWEST_HZ if whole else DOUBTED_SLOW_HZ):
         return CountedIn(1.0)
     likely = [(unit_s, name) for unit_s, name in _UNITS if _plausible(unit_s, step, span)]
     if step == 1 and whole:
@@ -82,11 +82,31 @@ def counted_in(stamps: NDArray[np.float64], stated_s: float | None) -> CountedIn
     return CountedIn(1.0, None, f"does not state its unit: it may be {readings}")
 
 
+# Where counters of so many bits begin anew.
+_WRAPS = (2.0**16, 2.0**24, 2.0**31, 2.0**32)
+
+
+def unwrapped(stamps: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    """Stamps of a counter that begins anew counted on, and its range; as they are, and 0, where none does."""
+    with np.errstate(all="ignore"):
+        steps = np.diff(stamps)
+        back = steps < 0
+        n_back = np.count_nonzero(back)
+        if not n_back or n_back > len(steps) // 4 or not np.isfinite(stamps).all():
+            return stamps, 0.0
+        step = float(np.median(steps[~back]))
+        for bound in _WRAPS:
+            across = steps[back] + bound
+            if float(np.ptp(stamps)) < bound and bool(np.all(np.abs(across - step) <= max(0.5 * step, 1))):
+                return stamps + bound * np.concatenate([[0.0], np.cumsum(back)]), bound
+    return stamps, 0.0
+
+
 def _stated(stated_s: float, step: float, span: float) -> CountedIn:
     """A stated unit is followed, unless another one makes a rig's record of what it makes none of."""
     hz = 1 / (step * stated_s)
     too_fast = hz > _DOUBTED_FAST_HZ and span * stated_s < _SHORTEST_S
-    too_slow = hz < _DOUBTED_SLOW_HZ and stated_s == 1.0
+    too_slow = hz < DOUBTED_SLOW_HZ and stated_s == 1.0
     if not (too_fast or too_slow):
         return CountedIn(stated_s)
     others = [(s, name) for s, name in _UNITS[:3] if s != stated_s and _plausible(s, step, span)]

@@ -53,6 +53,11 @@ def rate_of(name: str, value: object) -> float | None:
     return tidy(number if key in _RATES else 1 / number)
 
 
+def states_unit(name: str) -> bool:
+    """Whether the name of a number that states the rate says in which unit."""
+    return re.search(r"(_hz|_s|wf_increment)$", name.strip(), re.IGNORECASE) is not None
+
+
 def tidy(rate: float) -> float:
     """1 / 0.001 as 1000 to the last bit; 1 / 0.003 stays what it is."""
     return float(round(rate)) if abs(rate - round(rate)) < 1e-9 * rate else rate
@@ -143,12 +148,16 @@ def collect(
     clocks: list[Clock] = []
     stated = list(statements)
     said = list(notes)
+    matrices = 0
     for name, array, unit in entries:
+        matrices += array.ndim > 1 and not array.dtype.names
         rate = rate_of(name, array) if array.size == 1 and array.dtype.kind in "iuf" else None
         if rate is not None:
-            stated.append(RateStatement(f"'{name}'", rate))
+            stated.append(RateStatement(f"'{name}'", rate, None, states_unit(name)))
         elif array.dtype.kind in "Mm" and array.ndim == 1:
             clocks.append(clock(name, array, len(series)))
         else:
             series += columns(name, array, unit, said)
-    return Contents(form, tuple(series), tuple(clocks), tuple(stated), tuple(said))
+    # The columns of one matrix have no names.
+    nameless = matrices == 1 and len({one.name.split("[")[0] for one in series}) == 1
+    return Contents(form, tuple(series), tuple(clocks), tuple(stated), tuple(said), nameless)

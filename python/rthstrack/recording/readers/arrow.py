@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 
 from rthstrack.errors import RecordingError
-from rthstrack.recording.readers.arrays import as_float, clock, rate_of, unit_in
+from rthstrack.recording.readers.arrays import as_float, clock, rate_of, states_unit, unit_in
 from rthstrack.recording.readers.contents import Clock, Contents, RateStatement, Series
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def contents_of(form: str, table: Any, notes: list[str]) -> Contents:
     for key, value in _plain(metadata).items():
         rate = rate_of(key, value)
         if rate is not None:
-            statements.append(RateStatement(f"metadata '{key}'", rate))
+            statements.append(RateStatement(f"metadata '{key}'", rate, None, states_unit(key)))
     if metadata.get(SAMPLE_LOG[0]) == SAMPLE_LOG[1]:
         series = _gaps_shown(series, said)
     return Contents(form, tuple(series), tuple(clocks), tuple(statements), tuple(said))

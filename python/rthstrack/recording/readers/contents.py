@@ -55,11 +55,15 @@ class Clock:
 
 @dataclass(frozen=True, slots=True)
 class RateStatement:
-    """A sampling rate that the file states, and where. `channel` is the path it holds for, None for the whole file."""
+    """A sampling rate that the file states, and where. `channel` is the path it holds for, None for the whole file.
+
+    in_unit: whether the file says in which unit.
+    """
 
     source: str
     rate_hz: float
     channel: str | None = None
+    in_unit: bool = True
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 
 from rthstrack.errors import RecordingError
-from rthstrack.recording.readers.arrays import collect, rate_of, unit_in
+from rthstrack.recording.readers.arrays import collect, rate_of, states_unit, unit_in
 from rthstrack.recording.readers.contents import STARTS, RateStatement
 
 if TYPE_CHECKING:
@@ -43,7 +43,9 @@ def read(path: Path) -> Contents:
             rate = rate_of(key, value)
             if rate is not None:
                 where = f" of '{name}'" if name else ""
-                statements.append(RateStatement(f"attribute '{key}'{where}", rate, name if is_dataset else None))
+                statements.append(
+                    RateStatement(f"attribute '{key}'{where}", rate, name if is_dataset else None, states_unit(key))
+                )
         if not is_dataset:
             return
         if item.shape is None or not (item.dtype.kind in "iufb" or item.dtype.names):

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from rthstrack.recording.readers.apart import first_line, work
-from rthstrack.recording.readers.contents import Contents, RateStatement, Series
+from rthstrack.recording.readers.contents import Clock, Contents, RateStatement, Series
 from rthstrack.recording.readers.matlab import SPARSE, Cell, Node, Opaque, Struct, contents, has_objects
 from rthstrack.recording.readers.matlab_objects import object_node
 from rthstrack.said import Said
@@ -148,11 +148,13 @@ def store(found: Contents, out: str) -> None:
     head = {
         "format": found.format,
         "series": [[one.name, one.path, one.unit, one.start_s] for one in found.series],
-        "statements": [[one.source, one.rate_hz] for one in found.statements],
+        "clocks": [[one.name, one.path, one.first_ns, one.after] for one in found.clocks],
+        "statements": [[one.source, one.rate_hz, one.channel, one.in_unit] for one in found.statements],
         "notes": [[note, note.code if isinstance(note, Said) else None] for note in found.notes],
         "nameless": found.nameless,
     }
     arrays: dict[str, Any] = {f"a{i}": one.values for i, one in enumerate(found.series)}
+    arrays |= {f"c{i}": one.seconds for i, one in enumerate(found.clocks)}
     np.savez(out, contents=np.array(json.dumps(head)), **arrays)
 
 
@@ -162,9 +164,13 @@ def restore(out: str) -> Contents:
         head = json.loads(str(arrays["contents"]))
         named = enumerate(head["series"])
         series = tuple(Series(name, path, unit, arrays[f"a{i}"], start) for i, (name, path, unit, start) in named)
-    statements = tuple(RateStatement(source, rate) for source, rate in head["statements"])
+        clocks = tuple(
+            Clock(name, path, arrays[f"c{i}"], first_ns, after)
+            for i, (name, path, first_ns, after) in enumerate(head["clocks"])
+        )
+    statements = tuple(RateStatement(*one) for one in head["statements"])
     notes = tuple(text if code is None else Said(text, code) for text, code in head["notes"])
-    return Contents(head["format"], series, (), statements, notes, head["nameless"])
+    return Contents(head["format"], series, clocks, statements, notes, head["nameless"])
 
 
 if __name__ == "__main__":

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from rthstrack.recording.readers.arrays import columns, rate_of
-from rthstrack.recording.readers.contents import STARTS, Contents, RateStatement, Series
+from rthstrack.recording.readers.arrays import columns, rate_of, states_unit
+from rthstrack.recording.readers.contents import STARTS, Clock, Contents, RateStatement, Series
 from rthstrack.said import Said
 
 if TYPE_CHECKING:
@@ -62,7 +62,15 @@ class Object:
     fields: Mapping[str, Node]
 
 
-Node: TypeAlias = "NDArray[Any] | str | Struct | Cell | Opaque | Table | Object"
+@dataclass(frozen=True, slots=True, eq=False)
+class Dates:
+    """Dates: seconds since the first (n_samples,), and that in ns since 1970."""
+
+    seconds: NDArray[np.float64]
+    first_ns: int
+
+
+Node: TypeAlias = "NDArray[Any] | str | Struct | Cell | Opaque | Table | Object | Dates"
 
 
 def has_objects(node: Node) -> bool:
@@ -76,14 +84,26 @@ def has_objects(node: Node) -> bool:
 
 def contents(form: str, variables: Mapping[str, Node]) -> Contents:
     """The channels of named variables; single numbers named fs, rate, rate_hz, dt or Ts state the rate."""
-    walk = _Walk([], [], [])
+    walk = _Walk([], [], [], [])
     for name, node in variables.items():
         walk.visit(name, node, None, None, 0)
     objects = list(filter(_is_unread, walk.notes))
     # What cannot be read is the first thing to say where nothing else was found.
     notes = objects + [note for note in walk.notes if note not in objects]
     one_matrix = len(variables) == 1 and isinstance(next(iter(variables.values())), np.ndarray)
-    return Contents(form, tuple(walk.series), (), tuple(walk.statements), tuple(notes), nameless=one_matrix)
+    statements = tuple(_by_struct(walk.statements, walk.beside))
+    return Contents(form, tuple(walk.series), tuple(walk.clocks), statements, tuple(notes), nameless=one_matrix)
+
+
+def _by_struct(statements: list[RateStatement], beside: Mapping[str, list[str]]) -> list[RateStatement]:
+    """Rates of structs that differ hold for the channels of each alone."""
+    if len({one.rate_hz for one in statements}) < 2:
+        return statements
+    found: list[RateStatement] = []
+    for one in statements:
+        paths = beside.get(one.source)
+        found += [replace(one, channel=path) for path in paths] if paths else [one]
+    return found
 
 
 def indexed(name: str, indices: Sequence[int | None]) -> str:
@@ -94,8 +114,11 @@ def indexed(name: str, indices: Sequence[int | None]) -> str:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Walk:
     series: list[Series]
+    clocks: list[Clock]
     statements: list[RateStatement]
     notes: list[str]
+    # The channels in the struct of a statement, by its source.
+    beside: dict[str, list[str]] = field(default_factory=dict)
 
     def visit(self, name: str, node: Node, label: str | None, unit: str | None, depth: int) -> None:
         if depth > _DEEPEST:
@@ -114,13 +137,15 @@ class _Walk:
                 self.visit(f"{name}.{key}", column, about, column_unit, depth + 1)
         elif isinstance(node, Object):
             # What a class keeps beside its signals is nobody's concern.
-            inner = _Walk(self.series, [], [])
+            inner = _Walk(self.series, self.clocks, [], [])
             n_before = len(self.series)
             inner.fields(name, node.fields, depth)
             if len(self.series) == n_before:
                 self.notes.append(_not_read(name, Opaque(node.what, True)))
             else:
                 self.notes.extend(filter(_is_unread, inner.notes))
+        elif isinstance(node, Dates):
+            self.clocks.append(Clock(name, name, node.seconds, node.first_ns, len(self.series)))
         elif isinstance(node, np.ndarray):
             self.array(name, node, label, unit)
 
@@ -128,10 +153,12 @@ class _Walk:
         """One element of a struct; `label` and `unit` beside numbers speak of these (as in Simulink's structures)."""
         label = _text(fields, "label", "name")
         unit = _text(fields, "unit", "units")
-        first, start_s = len(self.series), _start(fields)
+        first, start_s, n_stated = len(self.series), _start(fields), len(self.statements)
         for key, node in fields.items():
             about = key.lower() in ("values", "data", "value", "y")
             self.visit(f"{name}.{key}", node, label if about else None, unit if about else None, depth + 1)
+        for one in self.statements[n_stated:]:
+            self.beside.setdefault(one.source, [series.path for series in self.series[first:]])
         if start_s is not None:
             self.series[first:] = [
                 one if one.start_s is not None else replace(one, start_s=start_s) for one in self.series[first:]
@@ -140,7 +167,7 @@ class _Walk:
     def array(self, name: str, array: NDArray[Any], label: str | None, unit: str | None) -> None:
         rate = rate_of(name, array) if array.size == 1 and array.dtype.kind in "iuf" else None
         if rate is not None:
-            self.statements.append(RateStatement(f"'{name}'", rate))
+            self.statements.append(RateStatement(f"'{name}'", rate, None, states_unit(name)))
             return
         found = columns(name, array, unit, self.notes, indexed)
         if label and len(found) == 1:

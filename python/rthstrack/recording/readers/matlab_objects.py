@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rthstrack.recording.readers.matlab import Node, Object, Opaque, Struct, Table
+from rthstrack.recording.readers.arrays import as_float
+from rthstrack.recording.readers.matlab import Dates, Node, Object, Opaque, Struct, Table
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -76,29 +77,41 @@ def _row_times(times: Any, n_rows: float | None, node: Callable[[Any], Node]) ->
     even = _fields(times)
     if not even:
         stated = None if times is None else node(times)
-        return stated if isinstance(stated, np.ndarray) else None
+        return stated if isinstance(stated, np.ndarray | Dates) else None
     start, step = (node(even[key]) if key in even else None for key in ("origin", "stepSize"))
     rate = _number(even.get("sampleRate"))
-    first = float(start.ravel()[0]) if isinstance(start, np.ndarray) and start.size else 0.0
+    index = np.arange(int(n_rows or 0))
     if _number(even.get("specifiedAsRate")) and rate:
-        return np.asarray(first + np.arange(int(n_rows or 0)) / rate)
-    if isinstance(step, np.ndarray) and step.size == 1:
-        return np.asarray(first + np.arange(int(n_rows or 0)) * float(step.ravel()[0]))
-    return None
+        passed = as_float(index / rate)
+    elif isinstance(step, np.ndarray) and step.size == 1:
+        passed = as_float(index * float(step.ravel()[0]))
+    else:
+        return None
+    if isinstance(start, Dates):
+        return Dates(passed, start.first_ns)
+    return np.asarray(passed + (float(start.ravel()[0]) if isinstance(start, np.ndarray) and start.size else 0.0))
 
 
 def _seconds(class_name: str, properties: Mapping[str, Any]) -> Node:
-    """A duration in seconds; a datetime in seconds since its first entry. Both are filed in milliseconds."""
+    """A duration in seconds, a datetime as dates. Both are filed in milliseconds, a datetime's since 1970."""
     found = properties.get("millis" if class_name == "duration" else "data")
     if not isinstance(found, np.ndarray) or found.dtype.kind not in "fciu" or not found.size:
         return Opaque(class_name, True)
     # What a double cannot hold of a date stands in the imaginary part.
     whole, rest = np.real(found), np.imag(found)
-    if class_name == "datetime":
-        finite = np.flatnonzero(np.isfinite(whole.ravel()))
-        at = int(finite[0]) if finite.size else 0
-        whole, rest = whole - whole.ravel()[at], rest - rest.ravel()[at]
-    return np.asarray((whole + rest) / 1e3)
+    if class_name == "duration":
+        return np.asarray((whole + rest) / 1e3)
+    whole, rest = whole.ravel(), rest.ravel()
+    finite = np.flatnonzero(np.isfinite(whole))
+    if not finite.size:
+        return Opaque("datetime without any date", False)
+    first, more = float(whole[finite[0]]), float(rest[finite[0]])
+    first_ns = int(first) * 10**6 + round((first - int(first) + more) * 1e6)
+    seconds = as_float(((whole - first) + (rest - more)) / 1e3)
+    if not np.nan_to_num(rest).any():
+        # A double alone holds today's dates to a quarter of a microsecond.
+        return Dates(np.round(seconds, 6), round(first_ns, -3))
+    return Dates(seconds, first_ns)
 
 
 def _columns(data: Any, names: list[str], units: Any, node: Callable[[Any], Node]) -> Node:

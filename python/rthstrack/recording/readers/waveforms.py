@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rthstrack.recording.readers.arrays import rate_of, tidy
+from rthstrack.recording.readers.arrays import rate_of, states_unit, tidy
 from rthstrack.recording.readers.contents import RateStatement
 
 
@@ -57,5 +57,6 @@ def rates(source: str, properties: Any) -> list[RateStatement]:
     for key, value in properties.items():
         rate = rate_of(key, value) if isinstance(value, (int, float)) else None
         if rate is not None:
-            found.append(RateStatement(f"property '{key}'" + (f" of '{source}'" if source else ""), rate))
+            whose = f" of '{source}'" if source else ""
+            found.append(RateStatement(f"property '{key}'{whose}", rate, None, states_unit(key)))
     return found
