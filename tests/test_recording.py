@@ -647,7 +647,6 @@ def test_thousands_of_whole_numbers_are_told_from_three_decimals(tmp_path: Path,
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("a.tdm", b'<?xml version="1.0"?>\n<usi:tdm version="1.0">\n', "TDM to TDMS"),
         ("a.mf4", b"MDF     4.10    " + bytes(64), "export it as MAT or CSV"),
         ("a.csv", b"<!DOCTYPE html><html>404</html>", "a web page in place of the file"),
         ("a.csv", b'{"time": [0, 1]}', "JSON"),

@@ -233,21 +233,11 @@ def _format(file: Path) -> Format:
         if not head:
             raise RecordingError("the file is empty")
         is_hdf5 = head.startswith(_HDF5) or _hdf5_behind_a_block(opened.seek, opened.read)
-    if b"<usi:tdm" in head or (head.startswith(b"<?xml") and file.suffix.lower() == ".tdm") or _is_tdx(file):
-        raise RecordingError(
-            f"LabVIEW's {file.suffix or 'TDM'}, which is not read; save the .tdm with its .tdx as TDMS: "
-            "'TDM to TDMS' in DIAdem, or 'TDMS Convert' in LabVIEW"
-        )
     for magic, what in _OTHERS:
         if head.startswith(magic):
             raise RecordingError(f"{what}; expected {', '.join(FORMAT_NAMES[:-1])} or {FORMAT_NAMES[-1]}")
     beginning = Beginning(file, head, is_hdf5)
     return next(one for one in FORMATS if one.recognises(beginning))
-
-
-def _is_tdx(file: Path) -> bool:
-    """A TDX is bare numbers, known by its name and the TDM beside it."""
-    return file.suffix.lower() == ".tdx" and any(file.with_suffix(ending).exists() for ending in (".tdm", ".TDM"))
 
 
 def _read_text(file: Path, part: Part) -> Contents:
