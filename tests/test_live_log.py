@@ -106,7 +106,7 @@ def test_evaluate_and_channels_take_a_log_without_flags(tmp_path: Path, capsys: 
     assert {channel["name"]: channel["unit"] for channel in listing["channels"]}["measured_1"] == "mm"
     assert main(["evaluate", str(path), "--json"]) == 0
     results = json.loads(capsys.readouterr().out)["results"]
-    assert [result["amplitude"] for result in results] == pytest.approx([0.9, 0.9])
+    assert [result["published"]["amplitude"] for result in results] == pytest.approx([0.9, 0.9])
     assert main(["channels", str(readings_path(path))]) == 0
 
 

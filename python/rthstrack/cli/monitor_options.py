@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rthstrack._core import settings_table
+from rthstrack._core import settings_table, usual_detrend
 from rthstrack.cli import addresses
 from rthstrack.cli.arguments import count, expected_delay_mistake
 from rthstrack.cli.quantities import hertz, seconds, seconds_from_zero
@@ -289,6 +289,7 @@ def _monitor(args: argparse.Namespace, n_actuators: int, mistakes: list[str]) ->
            "data_decimation": given["data_decimation"] or largest_decimation(rate, band[1], update)}  # fmt: skip
     settings = dataclasses.asdict(MonitorSettings(rate))
     settings |= {name: value for name, value in given.items() if value is not None} | own
+    settings["detrend"] = settings["detrend"] or usual_detrend(settings["estimator"])
     p, window = settings["data_decimation"], settings["window_s"]
     if args.rate is not None:
         mistakes += _band_mistakes(rate, band, given["data_decimation"])

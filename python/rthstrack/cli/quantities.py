@@ -19,22 +19,26 @@ _EXPECTED = {
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*", re.DOTALL)
 
 
-def number(text: str, unit: str = "") -> float:
-    """The number in SI, checked to be finite; `unit` is the SI's unit of what is expected, "" for a bare number."""
+def number(text: str, unit: str = "", expected: str = "a finite number") -> float:
+    """The number in SI, checked to be finite; `unit` is the SI's unit of what is expected, "" for a bare number.
+
+    expected: what it is, in words, for what is no number.
+    """
     found = _NUMBER.fullmatch(text)
     size = _size(found[2], unit, text) if found and found[2] else 1.0
-    value = size * (float(found[1]) if found else _word(text))
+    value = size * (float(found[1]) if found else _word(text, expected))
     if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"expected a finite number, found '{text}'")
+        raise argparse.ArgumentTypeError(f"expected {expected}, found '{text}'")
     return value
 
 
-def _word(text: str) -> float:
+def _word(text: str, expected: str) -> float:
     """inf and nan are numbers, though none that is taken."""
     try:
         return float(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"expected a number, found '{text}'") from None
+        expected = expected.replace("a finite number", "a number")
+        raise argparse.ArgumentTypeError(f"expected {expected}, found '{text}'") from None
 
 
 def _size(suffix: str, unit: str, text: str) -> float:

@@ -122,7 +122,7 @@ def _value(row: _SettingRow, text: str) -> str | int | float:
         return text
     if row["kind"] in ("whole", "power_of_two"):
         return int(text) if text.isascii() and text.isdigit() else text
-    return number(text, row["unit"])
+    return number(text, row["unit"], row["expected"])
 
 
 def _help(row: _SettingRow, default: str | None) -> str:
