@@ -390,8 +390,9 @@ def test_a_log_that_cannot_be_written_is_told_at_the_start_in_a_line(
         pytest.skip("this user may write everywhere")
     done = refused("--log", path)
     assert (done.returncode, done.stdout) == (expected, "")
-    (line,) = done.stderr.splitlines()
+    line, *usage = done.stderr.splitlines()
     assert message.format(tmp=tmp_path) in line
+    assert len(usage) == 2
     assert (tmp_path / "there.arrows").read_text() == "of another test"
 
 
