@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-PAGES = ("README.md", "docs/estimators.md", "docs/online.md")
+PAGES = ("README.md", "docs/estimators.md", "docs/limits.md", "docs/online.md")
 
 # What a reader does once, before anything can be pasted; `make test` and test_install.py try these.
 SETTING_UP = ("pip ", "python -m pip", "git ", "make", "cargo ", "cd ", "apt")
@@ -79,3 +79,13 @@ def test_what_the_page_shows_and_links_to_is_there(root: Path, page: str) -> Non
     local = [a or b for a, b in links if "://" not in (a or b)]
     assert local, "the page shows no picture and links to nothing in the repository"
     assert [link for link in local if not ((root / page).parent / link).exists()] == []
+
+
+def test_the_glossary_has_the_words_that_are_printed(root: Path) -> None:
+    from rthstrack.verdict import display, limits, warnings
+
+    glossary = (root / "docs/glossary.md").read_text(encoding="utf-8")
+    words = [name for name, *_ in display.INDICES]
+    words += [*display.ESTIMATORS, *display.ESTIMATORS.values(), *limits._CONCLUSIONS, *limits._CONCLUSIONS.values()]
+    words += [*warnings._BAD_WORDS, "held"]
+    assert [word for word in words if word not in glossary] == []
