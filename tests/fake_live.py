@@ -118,7 +118,7 @@ class FakeLive:
         alarm = {
             "name": self.alarm_name, "actuator": 0, "active": self.alarmed(), "latched": False,
             "since_s": self.alarm_after_s, "value": 0.021, "limit": 0.02,
-            "text": "advisory: actuator 0: delay of 21.000 ms, limit 20.000 ms either way",
+            "text": "advisory: actuator 1: lag of up to 21.000 ms, limit 20.000 ms",
         }  # fmt: skip
         if self.alarm_name == "silence":
             alarm |= {"actuator": None, "text": "advisory: no sample for more than 1.0 s"}

@@ -122,7 +122,7 @@ def test_a_bad_sample_of_one_actuator_is_refused_with_the_actuator_named() -> No
     target, measured = (np.column_stack([signal] * 3) for signal in signals())
     measured[77, 1] = math.nan
     for call in (published, CALLS["evaluate_moving"]):
-        refuses(rthstrack.SignalError, r"actuator 1.*\b77\b|\b77\b.*actuator 1", call, target, measured, RATE)
+        refuses(rthstrack.SignalError, r"actuator 2.*\b77\b|\b77\b.*actuator 2", call, target, measured, RATE)
 
 
 @every_call

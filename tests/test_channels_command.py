@@ -70,7 +70,7 @@ def test_json_holds_the_same_with_full_precision(file: Path, capsys: pytest.Capt
         "n_nan": 1,
         "n_infinite": 0,
     }
-    assert listing["proposed"] == [{"target": "cmd_mm", "measured": "meas_mm"}]
+    assert listing["proposed"] == [{"actuator_number": 1, "target": "cmd_mm", "measured": "meas_mm"}]
 
 
 def test_a_file_that_cannot_be_read_does_not_stop_the_others(

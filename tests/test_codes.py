@@ -84,7 +84,7 @@ def test_an_exception_says_in_numbers_what_it_says_in_words() -> None:
     assert (caught.value.code, caught.value.values, caught.value.file) == ("not_finite", (3.0, 100.0), "")
     with pytest.raises(rthstrack.SignalError) as caught:
         rthstrack.evaluate_moving(np.column_stack([broad()] * 2), np.column_stack([broad(), holed]), RATE)
-    assert str(caught.value).startswith("actuator 1: ")
+    assert str(caught.value).startswith("actuator 2: ")
     assert (caught.value.code, caught.value.values) == ("not_finite", (3.0, 100.0))
     with pytest.raises(rthstrack.SettingError) as caught:
         rthstrack.evaluate(broad(), broad(), RATE, data_decimation=3)

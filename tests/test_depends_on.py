@@ -204,7 +204,7 @@ def test_an_uncertainty_beyond_the_record_is_no_number(reach_s: float, hidden: b
     short = {"n_samples": round(tracking.rate_hz / 2), "reason_values": (reach_s,)}
     found = rthstrack.verdict.reason(dataclasses.replace(tracking, **said, **short))
     advice = "take a longer window or a band with less noise"
-    told = f"not determined: noise hides the delay altogether; {advice}" if hidden else said["reason"]
+    told = f"not determined: the noise is too strong to find the delay; {advice}" if hidden else said["reason"]
     assert (found, found.code, found.values) == (told, "uncertain", (reach_s,))
 
 

@@ -100,3 +100,13 @@ def test_what_python_prints_is_shown(tmp_path: Path) -> None:
         folder = tmp_path / str(i)
         folder.mkdir()
         assert len(mistakes(page + rest, folder)) == n
+
+
+def test_the_glossary_has_the_words_that_are_printed(root: Path) -> None:
+    from rthstrack.verdict import display, limits, warnings
+
+    glossary = (root / "docs/glossary.md").read_text(encoding="utf-8")
+    words = [name for name, *_ in display.INDICES]
+    words += [*display.ESTIMATORS, *display.ESTIMATORS.values(), *limits._CONCLUSIONS, *limits._CONCLUSIONS.values()]
+    words += [*warnings._BAD_WORDS, "held"]
+    assert [word for word in words if word not in glossary] == []

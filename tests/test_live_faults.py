@@ -296,7 +296,7 @@ def test_the_page_of_the_real_monitor_moves_turns_red_latches_is_reset_and_shows
         wait(alert.format("latched"))
         page.wait_for_timeout(1000)
         assert page.evaluate(alert.format("latched"))
-        assert any(re.search(r"ALARM at [\d.]+ s: advisory: actuator 0: lag of up to", line) for line in monitor.said)
+        assert any(re.search(r"ALARM at [\d.]+ s: advisory: actuator 1: lag of up to", line) for line in monitor.said)
         # A datagram resets it.
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control:
             control.sendto(b"rest", ("127.0.0.1", monitor.control_port))

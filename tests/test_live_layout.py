@@ -57,14 +57,14 @@ def test_every_key_of_datagrams_is_read(tmp_path: Path) -> None:
     assert layout == DatagramLayout(
         (
             Channels(Field(8, "f32", 25.4, 1.5), Field(12, "i16", -0.01), "north", "mm"),
-            Channels(Field(16), Field(24), "actuator 1"),
+            Channels(Field(16), Field(24), "actuator 2"),
         ),
         Field(4, "u32"),
         "big",
         8,
         40,
     )
-    assert (layout.n_actuators, layout.names, layout.units) == (2, ("north", "actuator 1"), ("mm", None))
+    assert (layout.n_actuators, layout.names, layout.units) == (2, ("north", "actuator 2"), ("mm", None))
     assert layout.to_dict() == {
         "byte_order": "big",
         "header_bytes": 8,
@@ -102,8 +102,8 @@ def test_the_compact_form_packs_fields_of_one_type_in_their_order() -> None:
     assert isinstance(layout, DatagramLayout)
     assert layout.sample_bytes == 28
     assert layout.counter == Field(8, "f32")
-    assert layout.actuators[0] == Channels(Field(12, "f32", 2.0), Field(16, "f32", 2.0), "actuator 0", "mm")
-    assert layout.actuators[1] == Channels(Field(20, "f32", 2.0), Field(4, "f32", 2.0), "actuator 1", "mm")
+    assert layout.actuators[0] == Channels(Field(12, "f32", 2.0), Field(16, "f32", 2.0), "actuator 1", "mm")
+    assert layout.actuators[1] == Channels(Field(20, "f32", 2.0), Field(4, "f32", 2.0), "actuator 2", "mm")
 
 
 def test_one_actuator_needs_no_number_and_a_counter_need_not_be() -> None:
@@ -137,7 +137,7 @@ def test_every_key_of_lines_is_read() -> None:
     assert layout == LineLayout(
         (
             Channels(Column("xt"), Column("xm", 25.4), "north", "mm"),
-            Channels(Column(3), Column(4), "actuator 1"),
+            Channels(Column(3), Column(4), "actuator 2"),
         ),
         "n",
         "csv",
@@ -285,7 +285,7 @@ def test_values_that_a_type_does_not_hold_are_told() -> None:
     assert isinstance(layout, DatagramLayout)
     layout.check_range("target", 0, np.array([-32768.0, 32767.0]))
     with pytest.raises(
-        SettingError, match=r"target of actuator 0 cannot be sent as i16.* comes to 32768; expected -32768"
+        SettingError, match=r"target of actuator 1 cannot be sent as i16.* comes to 32768; expected -32768"
     ):
         layout.check_range("target", 0, np.array([0.0, 32768.0]))
     with pytest.raises(SettingError, match="NaN or infinite"):

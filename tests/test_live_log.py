@@ -38,7 +38,15 @@ def a_live(n_actuators: int = 2) -> FakeLive:
 
 def a_log(live: Any, path: Path, said: list[str] | None = None) -> Log:
     say = ([] if said is None else said).append
-    return Log(live, path, rate_hz=RATE, units=("mm", None), settings={"monitor": {"window_s": 4.0}}, say=say)
+    return Log(
+        live,
+        path,
+        rate_hz=RATE,
+        names=("north", "actuator 2"),
+        units=("mm", None),
+        settings={"monitor": {"window_s": 4.0}},
+        say=say,
+    )
 
 
 def logged(path: Path, seconds: float) -> FakeLive:
@@ -79,13 +87,15 @@ def test_every_sample_and_reading_is_in_the_log_with_units_rate_and_settings(tmp
     readings = pa.ipc.open_stream(readings_path(path)).read_all()
     assert readings.num_rows == live.reading > 0
     assert readings.column_names == [
-        "index", "time_s", "centre_s", "actuator", "amplitude", "delay_s", "phase_rad", "equivalent_frequency_hz",
+        "index", "time_s", "centre_s", "actuator", "actuator_number", "actuator_name",
+        "amplitude", "delay_s", "phase_rad", "equivalent_frequency_hz",
         "amplitude_low", "amplitude_high", "delay_low_s", "delay_high_s", "valid", "reason", "reason_code",
         "reason_values", "received", "lost",
         "repeated", "reordered", "malformed", "alarms",
     ]  # fmt: skip
     assert readings.slice(0, 1).to_pylist()[0] | {"delay_low_s": None, "delay_high_s": None} == {
-        "index": 0, "time_s": 0.0, "centre_s": -2.0, "actuator": 0, "amplitude": 0.5, "delay_s": 0.5, "phase_rad": 0.5,
+        "index": 0, "time_s": 0.0, "centre_s": -2.0, "actuator": 0, "actuator_number": 1,
+        "actuator_name": "north", "amplitude": 0.5, "delay_s": 0.5, "phase_rad": 0.5,
         "equivalent_frequency_hz": 0.5, "amplitude_low": 0.4, "amplitude_high": 0.6, "delay_low_s": None,
         "delay_high_s": None, "valid": True, "reason": None, "reason_code": None, "reason_values": [],
         "received": 3, "lost": 3, "repeated": 3, "reordered": 3,
@@ -101,7 +111,7 @@ def test_evaluate_and_channels_take_a_log_without_flags(tmp_path: Path, capsys: 
     (listing,) = json.loads(capsys.readouterr().out)["files"]
     assert (listing["format"], listing["rate_hz"]) == ("Arrow stream", RATE)
     assert listing["rate_source"] == "metadata 'rate_hz'"
-    pairs = [{"target": f"target_{i}", "measured": f"measured_{i}"} for i in (1, 2)]
+    pairs = [{"actuator_number": i, "target": f"target_{i}", "measured": f"measured_{i}"} for i in (1, 2)]
     assert listing["proposed"] == pairs
     assert {channel["name"]: channel["unit"] for channel in listing["channels"]}["measured_1"] == "mm"
     assert main(["evaluate", str(path), "--json"]) == 0
@@ -151,7 +161,7 @@ def a_log_file(path: Path, index: np.ndarray, counter: np.ndarray) -> Path:
         "index": index, "time_s": index / RATE, "counter": counter, "filled": np.zeros(len(index), np.bool_),
         "target": target, "measured": 0.9 * target,
     }  # fmt: skip
-    log = Log(live, path, rate_hz=RATE, units=(None,), settings={}, say=[].append)
+    log = Log(live, path, rate_hz=RATE, names=("actuator 1",), units=(None,), settings={}, say=[].append)
     log._write()
     log.stop()
     return path

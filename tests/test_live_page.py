@@ -42,7 +42,7 @@ class MadeUp:
 
     def __init__(self, n_actuators: int = 4, names: list[str] | None = None, rate_hz: float = RATE_HZ) -> None:
         self.rate_hz, self.per_reading = rate_hz, int(rate_hz / UPDATE_HZ)
-        self.names = names or [f"actuator {k}" for k in range(n_actuators)]
+        self.names = names or [f"actuator {k + 1}" for k in range(n_actuators)]
         self.delay_s = [0.004 + 0.002 * k for k in range(n_actuators)]
         self.amplitude = [0.98 + 0.01 * k for k in range(n_actuators)]
         self.reason: list[str | None] = [None] * n_actuators
@@ -478,7 +478,7 @@ def test_a_crossed_limit_turns_red_and_latches_until_it_is_reset(
     source.delay_s[1] = 0.02
     page.until_alert("active")
     ((_, words),) = page.alerts()
-    assert "Delay · actuator 1" in words
+    assert "Delay · actuator 2" in words
     assert "advisory" in words
     red = page.page.evaluate(colour.format(".alerts .active", "backgroundColor"))
     assert red == "rgb(179, 21, 31)"
@@ -514,10 +514,10 @@ def test_an_actuator_that_is_not_judged_is_an_alarm_like_the_others(
         "value": 7.0,
         "limit": 6.0,
     }
-    source._alarms["unjudged", 1] = alarm | {"text": "advisory: actuator 1: no valid reading for 7.0 s"}
+    source._alarms["unjudged", 1] = alarm | {"text": "advisory: actuator 2: no valid reading for 7.0 s"}
     page = opened(serve(source))
     page.until_alert("active")
-    assert "Not judged · actuator 1" in page.alerts()[0][1]
+    assert "Not judged · actuator 2" in page.alerts()[0][1]
     page.until("document.querySelectorAll('.card')[1].querySelector('.verdict').textContent === 'alarm'")
     source._alarms["unjudged", 1]["active"] = False
     page.until_alert("latched")
@@ -545,7 +545,7 @@ def test_an_alarm_is_spoken_once_whatever_its_numbers_do(
     source.delay_s[0] = 0.004
     page.until_alert("latched")
     page.until("window.spoken.length > 1")
-    assert page.page.evaluate("window.spoken") == ["Alarm: Delay · actuator 0.", "Latched: Delay · actuator 0."]
+    assert page.page.evaluate("window.spoken") == ["Alarm: Delay · actuator 1.", "Latched: Delay · actuator 1."]
 
 
 def test_axes_bear_the_unit_of_the_chosen_actuator(serve: Callable[..., Page], opened: Callable[..., Opened]) -> None:
@@ -684,7 +684,7 @@ def test_the_page_is_used_by_keyboard(serve: Callable[..., Page], opened: Callab
         page.page.keyboard.press(key)
         checked = "[...document.querySelectorAll('.card')].findIndex((c) => c.getAttribute('aria-checked') === 'true')"
         assert page.page.evaluate(checked) == chosen
-    assert "actuator 2" in page.page.locator("h2", has_text="Target and measured").inner_text()
+    assert "actuator 3" in page.page.locator("h2", has_text="Target and measured").inner_text()
     page.page.keyboard.press("Tab")
     page.page.keyboard.press("ArrowRight")
     shown = "document.querySelector('[data-chart=\"delay\"]').chart.u.series.slice(1, 4).map((s) => s.show)"

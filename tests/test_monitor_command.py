@@ -247,7 +247,7 @@ def test_defaults_are_those_that_the_help_states(capsys: pytest.CaptureFixture[s
     }  # fmt: skip
     assert made.outputs == {
         "readings_udp": None, "readings_file": None, "alarm_udp": None, "control": None, "log": False, "page": False,
-        "names": ["actuator 0", "actuator 1"],
+        "names": ["actuator 1", "actuator 2"],
         "units": [None, None],
     }  # fmt: skip
 
@@ -282,7 +282,7 @@ def test_every_option_reaches_the_compiled_part(
     }  # fmt: skip
     assert made.outputs == {
         "readings_udp": "127.0.0.1:7003", "readings_file": str(tmp_path / "r.jsonl"), "alarm_udp": "127.0.0.1:7001",
-        "control": "127.0.0.1:7002", "log": True, "page": False, "names": ["actuator 0"],
+        "control": "127.0.0.1:7002", "log": True, "page": False, "names": ["actuator 1"],
         "units": [None],
     }  # fmt: skip
 
@@ -426,7 +426,7 @@ def test_events_and_alarms_are_a_line_each_and_once(capsys: pytest.CaptureFixtur
     assert status == 0
     assert err[1:] == [
         "rthstrack: at 0.10 s: 12 samples lost, the window starts anew",
-        "rthstrack: ALARM at 0.20 s: advisory: actuator 0: delay of 21.000 ms, limit 20.000 ms either way",
+        "rthstrack: ALARM at 0.20 s: advisory: actuator 1: lag of up to 21.000 ms, limit 20.000 ms",
     ]
 
 
@@ -475,10 +475,8 @@ def test_an_alarm_that_came_and_went_between_two_looks_ends_it_too(
     capsys: pytest.CaptureFixture[str], fake: type[FakeLive]
 ) -> None:
     fake.events = (
-        event(
-            "alarm_raised", 0.1, "advisory: actuator 0: delay of 21.000 ms, limit 20.000 ms", alarm="delay", actuator=0
-        ),
-        event("alarm_over", 0.2, "advisory: actuator 0: alarm 'delay' is over", alarm="delay", actuator=0),
+        event("alarm_raised", 0.1, "advisory: actuator 1: lag of up to 21.000 ms", alarm="delay", actuator=0),
+        event("alarm_over", 0.2, "advisory: actuator 1: alarm 'delay' is over", alarm="delay", actuator=0),
     )
     assert run(capsys, *UDP, "--exit-on-alarm")[0] == 3
     fake.events = fake.events[1:]
@@ -596,7 +594,7 @@ def test_the_terminal_view_shows_readings_takes_keys_and_gives_the_terminal_back
         os.write(ours, b"q")
         seen += read_until(ours, b"summary")
         assert process.wait(timeout=20) == 0
-    assert b"actuator 0" in seen
+    assert b"actuator 1" in seen
     assert b"valid" in seen
     # The alternate screen is left and the cursor shown.
     assert seen.rindex(b"\x1b[?1049l") > seen.rindex(b"\x1b[?1049h")
@@ -663,14 +661,14 @@ def a_status(n_actuators: int, **changes: Any) -> dict[str, Any]:
 
 
 def an_alarm(actuator: int, *, active: bool = True) -> dict[str, Any]:
-    text = f"advisory: actuator {actuator}: delay of 21.000 ms, limit 20.000 ms either way"
+    text = f"advisory: actuator {actuator + 1}: lag of up to 21.000 ms, limit 20.000 ms"
     return {"name": "delay", "actuator": actuator, "active": active, "latched": not active, "text": text}
 
 
 @pytest.mark.parametrize("size", [(80, 24), (120, 24), (60, 12), (40, 8), (200, 90)])
 @pytest.mark.parametrize("raised", [[], [63], list(range(20, 64)), list(range(64))])
 def test_the_view_fits_its_terminal_and_shows_health_and_alarms_first(size: tuple[int, int], raised: list[int]) -> None:
-    names = tuple(f"actuator {i}" for i in range(64))
+    names = tuple(f"actuator {i + 1}" for i in range(64))
     status = a_status(64) | {"alarms": [an_alarm(i, active=i % 2 == 1) for i in raised]}
     lines = drawn(status, names, size, events=[f"at {i}.00 s: " + 30 * "something " for i in range(6)]).splitlines()
     assert len(lines) <= size[1]
@@ -680,14 +678,14 @@ def test_the_view_fits_its_terminal_and_shows_health_and_alarms_first(size: tupl
     if raised:
         assert lines[2].startswith("ALARM advisory: actuator")
         # What is over now comes before what is held.
-        assert int(re.findall(r"actuator (\d+):", lines[2])[0]) % 2 == 1
+        assert int(re.findall(r"actuator (\d+):", lines[2])[0]) % 2 == 0
         told = sum(line.startswith("ALARM") for line in lines)
         more = [int(found[1]) for line in lines if (found := re.match(r"and (\d+) more alarms", line))]
         assert told + sum(more) == len(raised)
         in_table = [line for line in lines if re.match(r"actuator \d+ .*12\.3", line)]
         # Eight lines have no room for a table beside alarms.
         assert in_table or size[1] == 8
-        assert not in_table or int(in_table[0].split()[1]) == raised[0] or len(in_table) == 64
+        assert not in_table or int(in_table[0].split()[1]) == raised[0] + 1 or len(in_table) == 64
     assert "at 5.00 s" in lines[-1]
 
 
@@ -753,7 +751,7 @@ def test_the_view_tells_what_is_not_valid_not_there_and_over_with_the_names_of_t
         "actuator": 1,
         "active": False,
         "latched": True,
-        "text": "advisory: actuator 1: delay of 9",
+        "text": "advisory: south: lag of 9",
     }
     silent = {
         "name": "silence",
@@ -782,7 +780,7 @@ def test_the_view_tells_what_is_not_valid_not_there_and_over_with_the_names_of_t
     assert "the target moves less than minimum_amplitude" in south
     assert "silent 7 received, 0 lost, 3 malformed" in text
     assert "log: stopped: disk full" in text
-    assert "ALARM advisory: south: delay of 9 (over, held until it is reset)" in text
+    assert "ALARM advisory: south: lag of 9 (over, held until it is reset)" in text
     assert "ALARM advisory: no sample for 2 s\n" in text
     assert "0 samples missing" not in text
     assert "at 1.00 s: something" in text
@@ -913,7 +911,7 @@ def test_a_delay_beyond_its_limit_ends_it_with_status_3(recorded: Path) -> None:
     status, summary, err = monitored.end(None)
     assert status == 3
     assert summary["alarms"] == 1
-    assert re.search(r"ALARM at [\d.]+ s: advisory: actuator 0: lag of up to 1[12]\.\d+ ms, limit 10\.000 ms", err)
+    assert re.search(r"ALARM at [\d.]+ s: advisory: actuator 1: lag of up to 1[12]\.\d+ ms, limit 10\.000 ms", err)
 
 
 @compiled

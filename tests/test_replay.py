@@ -261,7 +261,7 @@ def test_a_folder_is_refused(capsys: pytest.CaptureFixture[str], recorded: Path)
         (["--to", "udp://127.0.0.1:5005", "--samples-per-datagram", "3000"], 2, "expected at most 2729"),
         (["--to", "udp://127.0.0.1:5005", "--layout", "no.toml"], 2, "no.toml: cannot be read"),
         (["--to", "udp://127.0.0.1:5005", "--layout", "two.toml"], 2, "for each target and measured, 1, found 2"),
-        (["--to", "udp://127.0.0.1:5005", "--layout", "i16.toml"], 2, "target of actuator 0 cannot be sent as i16"),
+        (["--to", "udp://127.0.0.1:5005", "--layout", "i16.toml"], 2, "target of actuator 1 cannot be sent as i16"),
     ],
 )
 def test_a_mistake_is_told_before_anything_is_sent(

@@ -273,7 +273,7 @@ def test_a_recorded_file_is_studied_by_its_channels(tmp_path: Path) -> None:
     assert not any("no channels were named" in note for note in named.notes)
     assert any("'other (cm)' converted from cm to mm" in note for note in named.notes)
     two = read_pairs(path, targets=["target (mm)"] * 2, measured=["measured (mm)", "other (cm)"])
-    assert [pair.name for pair in two] == [f"{path}, actuator 0", f"{path}, actuator 1"]
+    assert [pair.name for pair in two] == [f"{path}, actuator 1", f"{path}, actuator 2"]
     with pytest.raises(SettingError, match="one measured for each target"):
         read_pairs(path, targets=["#0"])
     with pytest.raises(RecordingError, match=r"absent\.csv: no such file"):

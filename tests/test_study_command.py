@@ -348,7 +348,7 @@ def test_each_actuator_of_a_run_has_its_own_truth(capsys: pytest.CaptureFixture[
     finished = simulate(VirtualTest(structure, actuators), synthetic_ground_motion(seed=3, duration_s=20.0))
     expected = [(0.9, 0.002), (1.2, 0.004)]
     found = study({"two": finished}, P=[1], Q=[1], windows="hann", timing=False)
-    assert found.source_names == ("two, actuator 0", "two, actuator 1")
+    assert found.source_names == ("two, actuator 1", "two, actuator 2")
     assert [(c.true_amplitude, c.true_delay_s) for c in found.cells] == [pytest.approx(e) for e in expected]
     finished.write(tmp_path / "run.h5")
     quick = ["-P", "1", "-Q", "1", "--windows", "hann", "--no-timing", "--json"]

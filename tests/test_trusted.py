@@ -145,7 +145,7 @@ def test_agreement_within_a_wide_interval_is_said_to_be_worth_little() -> None:
             "--window hann",
         ),
         ("noise above", broad() + noise(0.05), broad(0.002) + noise(0.05, 2), {}, "--band 0"),
-        ("spread from 32 to 3", broad(), broad(0.09), {}, ""),
+        ("phases from 32 to 3", broad(), broad(0.09), {}, ""),
         ("hann window", broad()[2000:2600], broad(0.002)[2000:2600], {"window": "hann"}, "--estimator aligned"),
     ],
     ids=["offset", "drift", "noise", "phases", "window"],
@@ -154,7 +154,7 @@ def test_the_cause_of_a_difference_is_named_and_removing_it_is_shown_to_help(
     cause: str, target: Signal, measured: Signal, settings: dict[str, Any], remedy: str
 ) -> None:
     found = assessed(target, measured, **settings)
-    assert found.argument.startswith("use the trusted estimate: the published average is ")
+    assert found.argument.startswith("use the trusted estimate: the published average gives ")
     assert cause in found.argument
     assert remedy in found.argument
 
@@ -220,7 +220,7 @@ UNDETERMINED = [
     ("opposite sign", burst(), -burst(0.01), {}),
 ]
 NO_INTERVAL = [
-    ("still follows target", broad(), broad(filtered=first_order), {}),
+    ("the residual follows target", broad(), broad(filtered=first_order), {}),
     ("too few frequency bins", burst(), burst(0.01) + noise(0.1), {"band_hz": (1.0, 1.1)}),
 ]
 

@@ -43,7 +43,7 @@ def test_a_plain_lag_deserves_no_warning() -> None:
         ("an offset", response() + 8, response(0.01) + 8),
         ("residual displacement", response() + 8 * (T > 25), response(0.01) + 8 * (T > 25.01)),
         ("above", response() + 1.5 * np.sin(2 * np.pi * 40 * T), response(0.01)),
-        ("half a turn", response(), -response(0.01)),
+        ("half a cycle", response(), -response(0.01)),
         ("opposite sign", response(), -response(0.01)),
         ("coherence", response(), response(0.01) + 6 * narrow_noise()),
         ("distinct values", np.round(response() / 2), response(0.01)),
@@ -124,7 +124,7 @@ def noisy(x: np.ndarray, share: float, seed: int) -> np.ndarray:
 def test_noise_on_the_target_is_told_with_its_level_and_taken_for_the_cause() -> None:
     assessment = rthstrack.assess(noisy(response(), 0.03, 1), noisy(0.95 * response(0.0123), 0.03, 2), RATE)
     (told,) = assessment.warnings
-    assert "target holds noise of its own, 3 % of its standard deviation" in told
+    assert "target contains noise, 3 % of its standard deviation" in told
     assert assessment.trusted.target_noise_std == pytest.approx(0.03 * response().std(), rel=0.05)
     assert "this is the trusted estimate" in assessment.argument
     assert "noise" in assessment.argument
@@ -147,8 +147,8 @@ def test_each_number_is_told_its_own_cause() -> None:
     target = np.fft.irfft(spectrum, N)
     late = np.fft.irfft(spectrum * np.exp(-2j * np.pi * f * 0.0123), N)
     argument = rthstrack.assess(noisy(target, 0.03, 4), noisy(late, 0.03, 5), RATE).argument
-    assert " ms below, as noise above " in argument
-    assert "% below in amplitude, as it averages phases that spread" in argument
+    assert " ms less, because noise above " in argument
+    assert "% less amplitude, because it averages phases from" in argument
 
 
 @pytest.mark.parametrize(("delay_s", "advice"), [(0.4, "try --max-delay 0.5"), (-0.3, "try --max-delay 0.5")])

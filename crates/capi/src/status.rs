@@ -71,23 +71,23 @@ pub enum rthstrack_reason {
     RTHSTRACK_REASON_NOT_FINITE = 2,
     /// Magnitudes leave the range of double precision.
     RTHSTRACK_REASON_RANGE = 3,
-    /// Too few samples are left for which the shifted target is known: `reason_values[0]` of them.
+    /// Too few samples are left to compare once the target is shifted by the delay: `reason_values[0]` of them.
     RTHSTRACK_REASON_TOO_SHORT = 4,
-    /// The target goes through too little of a cycle: `reason_values[0]` cycles.
+    /// The window holds too little of a cycle of the target's motion: `reason_values[0]` cycles.
     RTHSTRACK_REASON_FEW_CYCLES = 5,
     /// Too little of measured follows the target: the share `reason_values[0]`.
     RTHSTRACK_REASON_LOW_COHERENCE = 6,
-    /// Noise leaves the delay uncertain by more than half a turn: `reason_values[0]` seconds either way.
+    /// Because of noise the delay is uncertain by more than half a cycle of the motion: `reason_values[0]` seconds.
     RTHSTRACK_REASON_UNCERTAIN = 7,
     /// Two delays fit equally well: `reason_values`, in seconds.
     RTHSTRACK_REASON_AMBIGUOUS = 8,
     /// The best delay lies beyond `reason_values[0]` seconds, the largest taken.
     RTHSTRACK_REASON_BEYOND_MAX_DELAY = 9,
-    /// Measured moves against the target; turned round it would lag by about `reason_values[0]` seconds.
+    /// Measured moves against the target; with its sign reversed it would lag by about `reason_values[0]` seconds.
     RTHSTRACK_REASON_OPPOSITE_SIGN = 10,
-    /// The iteration did not settle on a delay.
+    /// The search for the delay did not converge.
     RTHSTRACK_REASON_NO_CONVERGENCE = 11,
-    /// The target is mostly noise of its own: the share `reason_values[0]` of it, or of its velocity.
+    /// The target is mostly noise: the share `reason_values[0]` of it, or of its velocity.
     RTHSTRACK_REASON_NOISY_TARGET = 12,
     /// Too many samples are bad (spikes, dropouts, frozen or clipped): the share `reason_values[0]`.
     RTHSTRACK_REASON_BAD_SAMPLES = 13,
@@ -95,15 +95,15 @@ pub enum rthstrack_reason {
     RTHSTRACK_REASON_OTHER = 99,
     /// No interval: the residual follows the target with coherence `reason_values[0]`.
     RTHSTRACK_REASON_RESIDUAL_FOLLOWS_TARGET = 100,
-    /// No interval: too few frequency bins to know the noise by.
+    /// No interval: too few frequency bins to estimate the noise.
     RTHSTRACK_REASON_FEW_BINS = 101,
-    /// No interval: it is known for weight power 2 only.
+    /// No interval: it can be computed for weight power 2 only.
     RTHSTRACK_REASON_WEIGHT_POWER = 102,
-    /// No interval: the share `reason_values[0]` of the target's motion lies above a third of the rate, too fast to be read
-    /// between samples.
+    /// No interval: the share `reason_values[0]` of the target's motion lies above a third of the rate, which is too
+    /// fast for it.
     RTHSTRACK_REASON_TOO_FAST = 103,
-    /// No interval: the noise is coloured, and how much of it is the target's own, up to the share `reason_values[0]` of its
-    /// velocity, is not known.
+    /// No interval: the noise is coloured, and how much of it is in the target, up to the share `reason_values[0]` of
+    /// its velocity, is not known.
     RTHSTRACK_REASON_COLOURED_TARGET_NOISE = 104,
 }
 

@@ -68,15 +68,15 @@ reasons! {
         /// How many are left.
         n_samples: usize
     } = 4, "too_short",
-        c"not determined: too few samples are left for which the shifted target is known; lower max_delay_s or \
-             take a longer window";
+        c"not determined: too few samples are left to compare once target is shifted by the delay; lower max_delay_s \
+             or take a longer window";
     /// The target goes through too little of a cycle.
     FewCycles {
         /// Cycles in the window, by its rms acceleration over its rms velocity.
         found: f64
     } = 5, "few_cycles",
-        c"not determined: target goes through too little of a cycle, at least 0.6 is needed; take a longer \
-             window";
+        c"not determined: the window holds too little of a cycle of target's motion, at least 0.6 of one is needed; \
+             take a longer window";
     /// Too little of measured follows the target.
     LowCoherence {
         /// Share that follows.
@@ -88,8 +88,8 @@ reasons! {
         /// From the delay to either end of its interval, in seconds.
         reach_s: f64
     } = 7, "uncertain",
-        c"not determined: noise leaves the delay uncertain by more than half a turn; take a longer window or a \
-             band with less noise";
+        c"not determined: because of noise the delay is uncertain by more than half a cycle of the motion; take a \
+             longer window or a band with less noise";
     /// Too many samples are bad: spikes, dropouts, frozen or clipped stretches.
     BadSamples {
         /// Share of the samples that would be left out.
@@ -103,8 +103,7 @@ reasons! {
         /// The other.
         other_s: f64
     } = 8, "ambiguous",
-        c"not determined: ambiguous, two delays fit equally well; give the one expected \
-             (expected_delay_s)";
+        c"not determined: ambiguous, two delays fit equally well; say about which one is expected (expected_delay_s)";
     /// The best delay lies outside what was searched.
     BeyondMaxDelay {
         /// The largest delay taken, in seconds.
@@ -120,39 +119,38 @@ reasons! {
         c"not determined: measured moves against target; does one of them have the opposite sign?";
     /// The iteration did not settle.
     NoConvergence = 11, "no_convergence",
-        c"not determined: the iteration did not settle on a delay";
+        c"not determined: the search for the delay did not converge";
     /// What the target holds is mostly noise of its own.
     NoisyTarget {
         /// Share of noise in the energy of its displacement or velocity, whichever is larger.
         share: f64
     } = 12, "noisy_target",
-        c"not determined: target is mostly noise of its own; take a longer window or a band with less noise";
+        c"not determined: target is mostly noise; take a longer window or a band with less noise";
     /// No interval: the residual follows the target, so that gain and delay are not one number each.
     ResidualFollowsTarget {
         /// Coherence of residual and target.
         coherence: f64
     } = 100, "residual_follows_target",
-        c"no interval: what one gain and one delay leave still follows target, so they are not constant over \
-             frequency or time";
+        c"no interval: one gain and one delay do not explain measured (the residual follows target), so they change with \
+             frequency or over time";
     /// No interval: the target moves too fast to be read between samples.
     TooFast {
         /// Share of the target's energy that lies above about 0.35 of the rate.
         share: f64
     } = 103, "too_fast",
-        c"no interval: target moves too fast to be read between samples; sample faster";
+        c"no interval: target moves too fast for the sampling rate; sample faster";
     /// No interval: the noise is coloured, and how much of it is the target's own is not known.
     ColouredTargetNoise {
         /// Share of the energy of the target, or of its velocity, that may be noise.
         share: f64
     } = 104, "coloured_target_noise",
-        c"no interval: the noise is coloured, so how much of it is target's own is not known; take a band with less \
-             noise";
+        c"no interval: the noise is coloured, so how much of it is in target is not known; take a band with less noise";
     /// No interval: too few frequency bins to know the noise by.
     FewBins = 101, "few_bins",
-        c"no interval: too few frequency bins to know the noise by";
+        c"no interval: too few frequency bins to estimate the noise";
     /// No interval: it is known for weight power 2 only.
     WeightPower = 102, "weight_power",
-        c"no interval: it is known for weight power 2 only";
+        c"no interval: it can be computed for weight power 2 only";
 }
 
 impl Reason {
@@ -172,12 +170,13 @@ impl fmt::Display for Reason {
         match self {
             Reason::TooShort { n_samples } => write!(
                 f,
-                "not determined: only {n_samples} samples are left for which the shifted target is known; \
+                "not determined: only {n_samples} samples are left to compare once target is shifted by the delay; \
                  lower max_delay_s or take a longer window"
             ),
             Reason::FewCycles { found } => write!(
                 f,
-                "not determined: target goes through {found:.2} of a cycle, at least 0.6 is needed; take a longer window"
+                "not determined: the window holds {found:.2} of a cycle of target's motion, at least 0.6 of one is needed; take a \
+                 longer window"
             ),
             Reason::LowCoherence { goodness } if goodness.is_nan() => {
                 write!(f, "not determined: measured does not move")
@@ -189,13 +188,13 @@ impl fmt::Display for Reason {
             ),
             Reason::Uncertain { reach_s } if *reach_s > 1.0 => write!(
                 f,
-                "not determined: noise leaves the delay uncertain by more than a second either way; take a longer window or a \
-                 band with less noise"
+                "not determined: because of noise the delay is uncertain by more than 1 s; take a longer window or a band with \
+                 less noise"
             ),
             Reason::Uncertain { reach_s } => write!(
                 f,
-                "not determined: noise leaves the delay uncertain by {:.3} ms either way, more than half a turn; \
-                 take a longer window or a band with less noise",
+                "not determined: because of noise the delay is uncertain by {:.3} ms, more than half a cycle of the motion; take \
+                 a longer window or a band with less noise",
                 1e3 * reach_s
             ),
             Reason::BadSamples { share } => write!(
@@ -206,7 +205,7 @@ impl fmt::Display for Reason {
             ),
             Reason::Ambiguous { delay_s, other_s } => write!(
                 f,
-                "not determined: ambiguous, delays of {:.4} and {:.4} ms fit equally well; give the one expected \
+                "not determined: ambiguous, delays of {:.4} and {:.4} ms fit equally well; say about which one is expected \
                  (expected_delay_s)",
                 1e3 * delay_s,
                 1e3 * other_s
@@ -220,31 +219,30 @@ impl fmt::Display for Reason {
             }
             Reason::OppositeSign { delay_s } => write!(
                 f,
-                "not determined: measured moves against target, {} of about {:.3} ms if turned round; does one of them have the \
-                 opposite sign?",
-                if *delay_s < 0.0 { "with a lead" } else { "with a lag" },
+                "not determined: measured moves against target; with its sign reversed it would {} by about {:.3} ms; does one \
+                 of them have the opposite sign?",
+                if *delay_s < 0.0 { "lead" } else { "lag" },
                 1e3 * delay_s.abs()
             ),
             Reason::NoisyTarget { share } => write!(
                 f,
-                "not determined: target is mostly noise of its own ({:.0} % of it or of its velocity); take a longer window or \
-                 a band with less noise",
+                "not determined: target is mostly noise ({:.0} % of it or of its velocity); take a longer window or a band with \
+                 less noise",
                 100.0 * share
             ),
             Reason::ResidualFollowsTarget { coherence } => write!(
                 f,
-                "no interval: what one gain and one delay leave still follows target (coherence {coherence:.2}), so they \
-                 are not constant over frequency or time"
+                "no interval: one gain and one delay do not explain measured (the residual follows target, coherence \
+                 {coherence:.2}), so they change with frequency or over time"
             ),
             Reason::TooFast { share } => write!(
                 f,
-                "no interval: {:.2} % of target's motion is too fast to be read between samples, above a third of their \
-                 rate; sample faster",
+                "no interval: {:.2} % of target's motion is too fast for the sampling rate, above a third of it; sample faster",
                 100.0 * share
             ),
             Reason::ColouredTargetNoise { share } => write!(
                 f,
-                "no interval: the noise is coloured, so how much of it is target's own is not known (up to {:.0} % of its \
+                "no interval: the noise is coloured, so how much of it is in target is not known (up to {:.0} % of target's \
                  velocity); take a band with less noise",
                 100.0 * share
             ),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rthstrack::{Monitor, MonitorState, Reading, Reason};
 
 use crate::alarm::{Alarm, AlarmConfig, Alarms, Change, Observed};
-use crate::event::{Event, Happening, printable};
+use crate::event::{Actuator, Event, Happening, printable};
 use crate::pace::{Pace, Verdict};
 use crate::sequence::{Place, Sequence, Tally};
 
@@ -397,7 +397,7 @@ impl Engine {
                 if is != *was {
                     *was = is;
                     let reason = reading.tracking.reason.filter(Reason::is_undetermined);
-                    let actuator = reading.actuator;
+                    let actuator = Actuator(Some(reading.actuator));
                     let what = match reason {
                         Some(reason) if !still => Happening::Undetermined { actuator, reason },
                         _ => Happening::Determined { actuator },

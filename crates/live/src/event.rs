@@ -7,6 +7,7 @@ use rthstrack::Reason;
 
 use crate::alarm::{Change, Kind};
 use crate::json;
+use crate::names::Names;
 
 /// A time of the stream and what happened.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,8 +22,8 @@ pub struct Event {
 
 impl Event {
     /// In one line. What a sender or a file has put into it does not reach a terminal as commands.
-    pub fn text(&self) -> String {
-        let mut text = printable(self.what.to_string());
+    pub fn text(&self, names: &Names) -> String {
+        let mut text = printable(self.what.text(names));
         if self.kept_back > 0 {
             text.push_str(&format!(" (before it {} more events, not shown)", self.kept_back));
         }
@@ -30,18 +31,18 @@ impl Event {
     }
 
     /// As an object.
-    pub(crate) fn write(&self, out: &mut String) {
+    pub(crate) fn write(&self, out: &mut String, names: &Names) {
         out.push('{');
         json::key(out, "time_s");
         json::number(out, self.time_s);
         json::key(out, "code");
         json::text(out, self.what.code());
         json::key(out, "values");
-        self.what.write_values(out);
+        self.what.write_values(out, names);
         json::key(out, "kept_back");
         json::whole(out, self.kept_back);
         json::key(out, "text");
-        json::text(out, &self.text());
+        json::text(out, &self.text(names));
         out.push('}');
     }
 }
@@ -79,10 +80,14 @@ impl fmt::Display for LogState {
     }
 }
 
+/// Which actuator, by its index from 0; `None` for the stream itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Actuator(pub Option<usize>);
+
 /// A value of an event, as a part of a JSON object.
 trait Held {
     fn write(&self, out: &mut String);
-    fn put(&self, name: &str, out: &mut String) {
+    fn put(&self, name: &str, _names: &Names, out: &mut String) {
         json::key(out, name);
         self.write(out);
     }
@@ -112,12 +117,12 @@ impl Held for i64 {
     }
 }
 
-impl Held for Option<usize> {
+impl Held for Actuator {
     fn write(&self, out: &mut String) {
-        match self {
-            Some(n) => n.write(out),
-            None => out.push_str("null"),
-        }
+        json::optional_whole(out, self.0);
+    }
+    fn put(&self, _: &str, names: &Names, out: &mut String) {
+        json::whose(out, self.0, names);
     }
 }
 
@@ -155,14 +160,14 @@ impl Held for Reason {
     fn write(&self, out: &mut String) {
         json::text(out, self.kind().code);
     }
-    fn put(&self, _: &str, out: &mut String) {
+    fn put(&self, _: &str, _names: &Names, out: &mut String) {
         json::reason(out, Some(self));
     }
 }
 
 /// What may happen, a row each: its values, its code, its words.
 macro_rules! happenings {
-    ($($(#[$doc:meta])* $variant:ident { $($field:ident: $type:ty),* } = $code:literal, $words:tt;)+) => {
+    ($names:ident; $($(#[$doc:meta])* $variant:ident { $($field:ident: $type:ty),* } = $code:literal, $words:tt;)+) => {
         /// What may happen.
         #[derive(Debug, Clone, PartialEq)]
         // What each value is, its name and the words say.
@@ -179,36 +184,36 @@ macro_rules! happenings {
                 }
             }
 
-            fn write_values(&self, out: &mut String) {
+            fn write_values(&self, out: &mut String, names: &Names) {
                 out.push('{');
                 match self {
                     $(Happening::$variant { $($field),* } => {
-                        $($field.put(stringify!($field), out);)*
+                        $($field.put(stringify!($field), names, out);)*
                     })+
                 }
                 out.push('}');
             }
-        }
 
-        impl fmt::Display for Happening {
+            /// In words, with the actuators called by these names.
             #[allow(unused_variables, reason = "not every value stands in the words")]
-            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            pub fn text(&self, $names: &Names) -> String {
                 match self {
-                    $(Happening::$variant { $($field),* } => happenings!(@write f, $words)),+
+                    $(Happening::$variant { $($field),* } => happenings!(@write $words)),+
                 }
             }
         }
     };
-    (@write $f:ident, ($($words:tt)*)) => { write!($f, $($words)*) };
+    (@write ($($words:tt)*)) => { format!($($words)*) };
 }
 
 happenings! {
+    names;
     /// An alarm was raised, or goes over its limit once more.
-    AlarmRaised { alarm: Kind, actuator: Option<usize>, value: f64, limit: f64 } = "alarm_raised",
-        ("{}", alarm.raised_text(*actuator, *value, *limit));
+    AlarmRaised { alarm: Kind, actuator: Actuator, value: f64, limit: f64 } = "alarm_raised",
+        ("{}", alarm.raised_text(actuator.0, *value, *limit, names));
     /// An alarm is over.
-    AlarmOver { alarm: Kind, actuator: Option<usize>, value: f64, limit: f64 } = "alarm_over",
-        ("{}", alarm.over_text(*actuator));
+    AlarmOver { alarm: Kind, actuator: Actuator, value: f64, limit: f64 } = "alarm_over",
+        ("{}", alarm.over_text(actuator.0, names));
     /// Somebody has reset the alarms.
     AlarmsReset { still_active: usize } = "alarms_reset", ("alarms reset{}", match still_active {
         0 => String::new(),
@@ -226,18 +231,19 @@ happenings! {
     /// Something comes again.
     SamplesAgain { silent_s: f64 } = "samples_again", ("samples again, after {silent_s:.1} s");
     /// An actuator's readings have no numbers any more.
-    Undetermined { actuator: usize, reason: Reason } = "undetermined", ("actuator {actuator}: {reason}");
+    Undetermined { actuator: Actuator, reason: Reason } = "undetermined",
+        ("{}{reason}", names.before(actuator.0));
     /// They have them again.
-    Determined { actuator: usize } = "determined", ("actuator {actuator}: determined again");
+    Determined { actuator: Actuator } = "determined", ("{}determined again", names.before(actuator.0));
     /// The counter's pace contradicts the rate.
     PaceContradicts { pace_hz: f64, rate_hz: f64 } = "pace_contradicts",
-        ("the counter advances by {pace_hz:.0} a second but --rate says {rate_hz}: time and delay are scaled by that");
+        ("the counter advances by {pace_hz:.0} a second but --rate says {rate_hz}: time and delay are wrong by that factor");
     /// The pace is not quite the rate.
     PaceOff { pace_hz: f64, rate_hz: f64 } = "pace_off",
-        ("the counter advances by {pace_hz:.1} a second but --rate says {rate_hz}: time and delay are scaled by that");
+        ("the counter advances by {pace_hz:.1} a second but --rate says {rate_hz}: time and delay are wrong by that factor");
     /// Two programs send at once.
     TwoSenders { sender: SocketAddr, other: SocketAddr } = "two_senders",
-        ("datagrams come from {sender} and from {other}: two senders make no sense of the counter; end one of them \
+        ("datagrams come from {sender} and from {other}: with two senders the counter has no meaning; end one of them \
           (--allow takes one machine only)");
     /// A sender is not one of those that may send.
     SenderRefused { sender: IpAddr } = "sender_refused",
@@ -271,7 +277,7 @@ happenings! {
 impl From<&Change> for Happening {
     fn from(change: &Change) -> Self {
         let (alarm, actuator, value, limit) =
-            (change.alarm.kind, change.alarm.actuator, change.alarm.value, change.alarm.limit);
+            (change.alarm.kind, Actuator(change.alarm.actuator), change.alarm.value, change.alarm.limit);
         if change.raised {
             Happening::AlarmRaised { alarm, actuator, value, limit }
         } else {

@@ -5,6 +5,7 @@ use std::fmt::Write;
 use rthstrack::{Getter, Reading, Reason, Tracking};
 
 use crate::alarm::{Alarm, Change};
+use crate::names::{self, Names};
 
 /// The shortest decimal number that reads back to the same bits; null where it is no finite number.
 pub(crate) fn number(out: &mut String, value: f64) {
@@ -115,7 +116,7 @@ fn interval(out: &mut String, (low, high): (f64, f64)) {
 }
 
 /// A reading as an object, without an end of line.
-pub fn reading(out: &mut String, reading: &Reading) {
+pub fn reading(out: &mut String, reading: &Reading, names: &Names) {
     let t = &reading.tracking;
     out.push('{');
     key(out, "index");
@@ -124,8 +125,7 @@ pub fn reading(out: &mut String, reading: &Reading) {
     number(out, reading.time_s);
     key(out, "centre_s");
     number(out, reading.centre_s);
-    key(out, "actuator");
-    whole(out, reading.actuator as u64);
+    whose(out, Some(reading.actuator), names);
     for kind in Tracking::NUMBERS.iter().filter(|kind| kind.live) {
         key(out, kind.name);
         match kind.of {
@@ -169,21 +169,34 @@ pub(crate) fn reading_row(out: &mut String, reading: &Reading) {
     out.push(']');
 }
 
-fn whose(out: &mut String, actuator: Option<usize>) {
+/// A whole number, or null.
+pub(crate) fn optional_whole(out: &mut String, value: Option<usize>) {
+    match value {
+        Some(value) => whole(out, value as u64),
+        None => out.push_str("null"),
+    }
+}
+
+/// An actuator by its index from 0, and by its number from 1 and its name as people read them; nulls for the stream itself.
+pub(crate) fn whose(out: &mut String, actuator: Option<usize>, names: &Names) {
     key(out, "actuator");
+    optional_whole(out, actuator);
+    key(out, "actuator_number");
+    optional_whole(out, actuator.map(names::number));
+    key(out, "actuator_name");
     match actuator {
-        Some(a) => whole(out, a as u64),
+        Some(actuator) => text(out, names.of(actuator)),
         None => out.push_str("null"),
     }
 }
 
 /// The datagram of an alarm.
-pub fn change(out: &mut String, change: &Change) {
+pub fn change(out: &mut String, change: &Change, names: &Names) {
     let alarm = &change.alarm;
     out.push_str("{\"alarm\":{");
     key(out, "name");
     text(out, alarm.kind.name());
-    whose(out, alarm.actuator);
+    whose(out, alarm.actuator, names);
     key(out, "raised");
     boolean(out, change.raised);
     key(out, "value");
@@ -193,16 +206,16 @@ pub fn change(out: &mut String, change: &Change) {
     key(out, "time_s");
     number(out, change.time_s);
     key(out, "text");
-    text(out, &if change.raised { alarm.text() } else { alarm.kind.over_text(alarm.actuator) });
+    text(out, &if change.raised { alarm.text(names) } else { alarm.kind.over_text(alarm.actuator, names) });
     out.push_str("}}");
 }
 
 /// An alarm as it stands.
-pub(crate) fn alarm(out: &mut String, alarm: &Alarm) {
+pub(crate) fn alarm(out: &mut String, alarm: &Alarm, names: &Names) {
     out.push('{');
     key(out, "name");
     text(out, alarm.kind.name());
-    whose(out, alarm.actuator);
+    whose(out, alarm.actuator, names);
     key(out, "active");
     boolean(out, alarm.active);
     key(out, "latched");
@@ -214,7 +227,7 @@ pub(crate) fn alarm(out: &mut String, alarm: &Alarm) {
     key(out, "limit");
     number(out, alarm.limit);
     key(out, "text");
-    text(out, &alarm.text());
+    text(out, &alarm.text(names));
     out.push('}');
 }
 
@@ -228,6 +241,11 @@ mod tests {
         let mut out = String::new();
         write(&mut out);
         out
+    }
+
+    /// The first actuator has a name.
+    fn north() -> Names {
+        Names::new(&["north \"1\"".to_owned()], 4)
     }
 
     #[test]
@@ -245,13 +263,15 @@ mod tests {
     fn a_reading_has_exactly_the_promised_keys() {
         let mut one = crate::alarm::tests::reading(3, 7.5, 0.98, 0.012);
         one.tracking.delay_interval_s = (0.011, 0.013);
-        let value: Value = serde_json::from_str(&made(|o| reading(o, &one))).unwrap();
+        let value: Value = serde_json::from_str(&made(|o| reading(o, &one, &north()))).unwrap();
         let keys: Vec<&String> = value.as_object().unwrap().keys().collect();
         let mut expected = [
             "index",
             "time_s",
             "centre_s",
             "actuator",
+            "actuator_number",
+            "actuator_name",
             "amplitude",
             "delay_s",
             "phase_rad",
@@ -265,6 +285,10 @@ mod tests {
         ];
         expected.sort_unstable();
         assert_eq!(keys, expected);
+        assert_eq!(
+            (&value["actuator"], &value["actuator_number"], &value["actuator_name"]),
+            (&3.into(), &4.into(), &"actuator 4".into())
+        );
         assert_eq!(value["amplitude"], 0.98);
         assert_eq!(value["amplitude_interval"], Value::Null);
         assert_eq!(value["delay_interval_s"][1], 0.013);
@@ -273,7 +297,7 @@ mod tests {
         assert_eq!(value["reason_code"], Value::Null);
         assert_eq!(value["reason_values"], serde_json::json!([]));
         one.tracking.reason = Some(Reason::Ambiguous { delay_s: 0.25, other_s: -0.125 });
-        let missing: Value = serde_json::from_str(&made(|o| reading(o, &one))).unwrap();
+        let missing: Value = serde_json::from_str(&made(|o| reading(o, &one, &north()))).unwrap();
         assert_eq!(missing["reason_code"], "ambiguous");
         assert_eq!(missing["reason_values"], serde_json::json!([0.25, -0.125]));
         one.tracking.reason = None;
@@ -296,16 +320,20 @@ mod tests {
     fn the_datagram_of_an_alarm_has_the_promised_keys() {
         let mut alarms = Alarms::new(AlarmConfig { limit_delay_s: Some(0.01), ..AlarmConfig::default() }, 1);
         let mut sent = String::new();
-        alarms.read(&crate::alarm::tests::reading(0, 2.0, 1.0, 0.02), |c| change(&mut sent, &c));
+        alarms.read(&crate::alarm::tests::reading(0, 2.0, 1.0, 0.02), |c| change(&mut sent, &c, &north()));
         let value: Value = serde_json::from_str(&sent).unwrap();
         assert_eq!(value["alarm"]["name"], "delay");
         assert_eq!(value["alarm"]["actuator"], 0);
+        assert_eq!(
+            (&value["alarm"]["actuator_number"], &value["alarm"]["actuator_name"]),
+            (&1.into(), &"north \"1\"".into())
+        );
         assert_eq!(value["alarm"]["raised"], true);
         assert_eq!(value["alarm"]["value"], 0.02);
         assert_eq!(value["alarm"]["limit"], 0.01);
         assert_eq!(value["alarm"]["time_s"], 2.0);
         assert!(value["alarm"]["text"].as_str().unwrap().starts_with("advisory"));
-        let standing: Value = serde_json::from_str(&made(|o| alarm(o, &alarms.all()[0]))).unwrap();
+        let standing: Value = serde_json::from_str(&made(|o| alarm(o, &alarms.all()[0], &north()))).unwrap();
         assert_eq!((&standing["active"], &standing["latched"]), (&Value::Bool(true), &Value::Bool(false)));
     }
     #[test]
@@ -316,11 +344,11 @@ mod tests {
         };
         let keys = |value: &Value| value.as_object().unwrap().keys().cloned().collect::<Vec<String>>();
         let one = crate::alarm::tests::reading(0, 2.0, 1.0, 0.02);
-        let new: Value = serde_json::from_str(&made(|o| reading(o, &one))).unwrap();
+        let new: Value = serde_json::from_str(&made(|o| reading(o, &one, &north()))).unwrap();
         assert!(keys(&old("readings.jsonl")).iter().all(|key| new.get(key).is_some()));
         let mut alarms = Alarms::new(AlarmConfig { limit_delay_s: Some(0.01), ..AlarmConfig::default() }, 1);
         let mut sent = String::new();
-        alarms.read(&one, |c| change(&mut sent, &c));
+        alarms.read(&one, |c| change(&mut sent, &c, &north()));
         let new: Value = serde_json::from_str(&sent).unwrap();
         assert!(keys(&old("alarms.jsonl")["alarm"]).iter().all(|key| new["alarm"].get(key).is_some()));
     }

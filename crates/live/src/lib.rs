@@ -31,6 +31,7 @@ pub mod layout;
 pub mod line;
 mod lines;
 mod live;
+pub mod names;
 mod outlets;
 mod pace;
 mod page;

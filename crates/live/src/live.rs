@@ -21,6 +21,7 @@ use crate::event::{Happening, LogState};
 use crate::layout::Layout;
 use crate::line::LineParser;
 use crate::lines::{Input, Lines};
+use crate::names::Names;
 use crate::outlets::{Ends, Item, Judged, Outlets, ROW_HEAD, Sender, Wanted};
 use crate::page::Page;
 use crate::publish::{keep_board, open_readings, write_readings};
@@ -121,7 +122,7 @@ impl Live {
     /// [`LiveError::Settings`] with all mistakes, [`LiveError::System`].
     pub fn new(config: LiveConfig) -> Result<Self, LiveError> {
         let monitor = checked(&config)?;
-        let shared = Arc::new(Shared::new());
+        let shared = Arc::new(Shared::new(Names::new(&config.outputs.names, config.monitor.n_actuators)));
         let (source, address, described, bits) = open_source(&config.source, &shared)?;
         let outputs = &config.outputs;
         let control = outputs

@@ -174,7 +174,7 @@ impl Outlet for Outlets {
     fn reading(&mut self, reading: &Reading) {
         if let Some(sender) = &self.readings {
             self.text.clear();
-            json::reading(&mut self.text, reading);
+            json::reading(&mut self.text, reading, &self.shared.names);
             sender.send(&self.text, &self.shared);
         }
     }
@@ -182,7 +182,7 @@ impl Outlet for Outlets {
     fn alarm(&mut self, change: &Change) {
         if let Some(sender) = &self.alarms {
             self.text.clear();
-            json::change(&mut self.text, change);
+            json::change(&mut self.text, change, &self.shared.names);
             sender.send(&self.text, &self.shared);
         }
     }

@@ -9,6 +9,7 @@ use crate::alarm::{AlarmConfig, Kind};
 use crate::board::Board;
 use crate::event::LogState;
 use crate::json::{self, boolean, key, list, number, optional, text, whole};
+use crate::names::Names;
 use crate::settings::OutputsConfig;
 use crate::shared::{Shared, locked};
 use crate::spectrum::{Spectra, windows};
@@ -42,7 +43,7 @@ impl Page {
         Self {
             spectra: Mutex::new(Spectra::new(monitor.evaluator())),
             board: Mutex::new(board),
-            hello: hello(&monitor, limits, source, outputs),
+            hello: hello(&monitor, limits, source, outputs, &shared.names),
             stride: (monitor.evaluated_rate_hz() / SCOPE_HZ).ceil().max(1.0) as u64,
             shared,
             monitor,
@@ -67,7 +68,7 @@ impl Page {
         self.scope(&mut out, &board, since);
         self.alarms(&mut out, &board);
         key(&mut out, "events");
-        list(&mut out, board.events_since(since), |out, event| event.write(out));
+        list(&mut out, board.events_since(since), |out, event| event.write(out, &self.shared.names));
         let version = board.version;
         drop(board);
         key(&mut out, "spectrum");
@@ -90,12 +91,12 @@ impl Page {
         let board = locked(&self.board);
         key(&mut out, "readings");
         list(&mut out, &board.latest, |out, reading| match reading {
-            Some(reading) => json::reading(out, reading),
+            Some(reading) => json::reading(out, reading, &self.shared.names),
             None => out.push_str("null"),
         });
         self.alarms(&mut out, &board);
         key(&mut out, "events");
-        list(&mut out, board.last_events(STATUS_EVENTS), |out, event| event.write(out));
+        list(&mut out, board.last_events(STATUS_EVENTS), |out, event| event.write(out, &self.shared.names));
         out.push('}');
         out
     }
@@ -146,7 +147,7 @@ impl Page {
 
     fn alarms(&self, out: &mut String, board: &Board) {
         key(out, "alarms");
-        list(out, &board.alarms, json::alarm);
+        list(out, &board.alarms, |out, alarm| json::alarm(out, alarm, &self.shared.names));
     }
 
     /// One caller makes it; others meanwhile show the last.
@@ -167,7 +168,7 @@ impl Page {
     }
 }
 
-fn hello(monitor: &Monitor, limits: &AlarmConfig, source: &str, outputs: &OutputsConfig) -> String {
+fn hello(monitor: &Monitor, limits: &AlarmConfig, source: &str, outputs: &OutputsConfig, names: &Names) -> String {
     let config = monitor.config();
     let mut made = String::from("{");
     let out = &mut made;
@@ -192,10 +193,7 @@ fn hello(monitor: &Monitor, limits: &AlarmConfig, source: &str, outputs: &Output
     key(out, "n_actuators");
     whole(out, config.n_actuators as u64);
     key(out, "names");
-    list(out, 0..config.n_actuators, |out, a| match outputs.names.get(a) {
-        Some(name) => text(out, name),
-        None => text(out, &format!("actuator {a}")),
-    });
+    list(out, 0..config.n_actuators, |out, a| text(out, names.of(a)));
     key(out, "units");
     list(out, 0..config.n_actuators, |out, a| match outputs.units.get(a) {
         Some(Some(unit)) => text(out, unit),

@@ -12,6 +12,7 @@ use rtrb::Consumer;
 
 use crate::event::Happening;
 use crate::json;
+use crate::names::Names;
 use crate::outlets::Item;
 use crate::page::Page;
 use crate::shared::{Shared, locked};
@@ -47,7 +48,7 @@ pub(crate) fn write_readings(shared: &Arc<Shared>, mut file: File, path: &Path, 
     loop {
         let ended = readings.is_abandoned();
         while !readings.is_empty() {
-            take_lines(&mut lines, &mut readings);
+            take_lines(&mut lines, &mut readings, &shared.names);
             if let Err(error) = file.write_all(lines.as_bytes()) {
                 // No part of a line stays behind; a device has no length to go back to.
                 let _ = file.set_len(length);
@@ -65,12 +66,12 @@ pub(crate) fn write_readings(shared: &Arc<Shared>, mut file: File, path: &Path, 
 }
 
 /// As many as are written at once.
-fn take_lines(lines: &mut String, readings: &mut Consumer<Reading>) {
+fn take_lines(lines: &mut String, readings: &mut Consumer<Reading>, names: &Names) {
     lines.clear();
     while lines.len() < MOST_AT_ONCE
         && let Ok(reading) = readings.pop()
     {
-        json::reading(lines, &reading);
+        json::reading(lines, &reading, names);
         lines.push('\n');
     }
 }

@@ -47,7 +47,7 @@ pub struct OutputsConfig {
     pub log: bool,
     /// Keep what the page shows.
     pub page: bool,
-    /// What the page calls the actuators; empty for "actuator 0" and so on.
+    /// What people call the actuators; empty for "actuator 1" and so on.
     pub names: Vec<String>,
     /// In which units their displacements are, where that is known; empty for none.
     pub units: Vec<Option<String>>,

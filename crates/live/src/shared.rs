@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use crate::engine::{Engine, Totals};
 use crate::event::{Happening, LogState};
+use crate::names::Names;
 use crate::sequence::Tally;
 
 /// The lock, whoever panicked with it.
@@ -73,6 +74,7 @@ const N_COUNTS: usize = 11;
 
 #[derive(Debug)]
 pub(crate) struct Shared {
+    pub(crate) names: Names,
     clock: Instant,
     counts: [AtomicU64; N_COUNTS],
     pub(crate) log_dropped: AtomicU64,
@@ -94,8 +96,9 @@ pub(crate) struct Shared {
 }
 
 impl Shared {
-    pub(crate) fn new() -> Self {
+    pub(crate) fn new(names: Names) -> Self {
         Self {
+            names,
             clock: Instant::now(),
             counts: std::array::from_fn(|_| AtomicU64::new(0)),
             log_dropped: AtomicU64::new(0),

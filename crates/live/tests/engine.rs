@@ -6,6 +6,7 @@ use rthstrack::{EvaluatorConfig, Monitor, MonitorConfig, MonitorState, Reading, 
 use rthstrack_live::alarm::{Alarm, AlarmConfig, Change, Kind};
 use rthstrack_live::engine::{Engine, EngineConfig, Outlet, Sample, Totals};
 use rthstrack_live::event::{Event, Happening};
+use rthstrack_live::names::Names;
 
 const RATE_HZ: f64 = 256.0;
 
@@ -42,7 +43,7 @@ impl Outlet for Memory {
     }
     fn restarted(&mut self) {}
     fn event(&mut self, event: Event) {
-        self.events.push((event.time_s, event.text()));
+        self.events.push((event.time_s, event.text(&Names::new(&[], 2))));
     }
 }
 
@@ -55,7 +56,7 @@ fn monitor() -> Arc<Monitor> {
 fn lines(readings: &[Reading]) -> Vec<String> {
     let line = |reading: &Reading| {
         let mut out = String::new();
-        rthstrack_live::json::reading(&mut out, reading);
+        rthstrack_live::json::reading(&mut out, reading, &Names::new(&[], 2));
         out
     };
     readings.iter().map(line).collect()
@@ -351,11 +352,11 @@ fn an_actuator_that_moves_and_is_not_judged_is_an_alarm() {
     assert_eq!(raised, [(Kind::Unjudged, Some(0), true)]);
     let at_s = bench.out.changes[0].time_s;
     assert!((at_s - (899.0 / RATE_HZ + 3.0)).abs() < 0.1, "{at_s}");
-    assert_eq!(bench.told("actuator 0: not determined: the window holds samples that are NaN"), 1);
+    assert_eq!(bench.told("actuator 1: not determined: the window holds samples that are NaN"), 1);
     bench.run(900);
     let unjudged = bench.engine.alarms().iter().find(|a| a.kind == Kind::Unjudged).unwrap();
     assert!(!unjudged.active && unjudged.latched);
-    assert_eq!(bench.told("actuator 0: determined again"), 1);
+    assert_eq!(bench.told("actuator 1: determined again"), 1);
 }
 
 #[test]
@@ -403,7 +404,7 @@ fn alarms_follow_the_readings_and_are_counted_once() {
     bench.delay_s = 0.030;
     bench.run(600);
     assert_eq!(bench.engine.totals().alarms, 1);
-    assert_eq!(bench.told("advisory: actuator 0: lag of up to"), 1);
+    assert_eq!(bench.told("advisory: actuator 1: lag of up to"), 1);
     bench.delay_s = 0.010;
     bench.run(600);
     bench.engine.reset(bench.now_s, &mut bench.out);

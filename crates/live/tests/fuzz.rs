@@ -10,6 +10,7 @@ use rthstrack_live::engine::{Engine, EngineConfig, Outlet, Sample, Totals};
 use rthstrack_live::event::Event;
 use rthstrack_live::layout::{ByteOrder, Field, Layout, LayoutConfig, Number};
 use rthstrack_live::line::{Column, Format, Line, LineParser, LinesConfig, Splitter};
+use rthstrack_live::names::Names;
 use serde_json::{Value, json};
 
 fn cases() -> u64 {
@@ -55,7 +56,7 @@ impl Outlet for Nowhere {
     fn evaluated(&mut self, _: f64, _: &Monitor, _: &MonitorState) {}
     fn restarted(&mut self) {}
     fn event(&mut self, event: Event) {
-        assert!(!event.text().contains('\n'));
+        assert!(!event.text(&Names::new(&[], 256)).contains('\n'));
     }
 }
 

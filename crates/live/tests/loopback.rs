@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use rthstrack::{EvaluatorConfig, MonitorConfig};
+use rthstrack_live::names::Names;
 use rthstrack_live::{Live, LiveConfig, LiveError, LoggedReading};
 use serde_json::{Value, json};
 
@@ -79,7 +80,7 @@ fn a_controller_gets_each_reading_and_each_alarm_as_a_datagram() {
     let (readings, alarms) = (receiver(), receiver());
     let outputs = json!({
         "readings_udp": readings.local_addr().unwrap().to_string(), "alarm_udp": alarms.local_addr().unwrap().to_string(),
-        "control": "127.0.0.1:0", "log": true, "page": true,
+        "control": "127.0.0.1:0", "log": true, "page": true, "names": ["north"],
     });
     let live =
         opened(usual_monitor(), usual_source(), json!({"limit_delay_s": 0.02, "silence_s": null}), outputs).unwrap();
@@ -88,7 +89,10 @@ fn a_controller_gets_each_reading_and_each_alarm_as_a_datagram() {
     let mut sender = Sender::to(&live);
     sender.send(512, 0.010);
     let first = received(&readings);
-    assert_eq!((&first["index"], &first["actuator"], &first["valid"]), (&json!(255), &json!(0), &json!(true)));
+    assert_eq!((&first["index"], &first["valid"]), (&json!(255), &json!(true)));
+    let whose = |told: &Value| ["actuator", "actuator_number", "actuator_name"].map(|key| told[key].clone());
+    let north = [json!(0), json!(1), json!("north")];
+    assert_eq!(whose(&first), north);
     assert!((first["delay_s"].as_f64().unwrap() - 0.010).abs() < 1e-4 && first["amplitude_interval"].is_null());
     assert!((first["amplitude"].as_f64().unwrap() - 0.9).abs() < 1e-3);
     (1..33).for_each(|i| assert_eq!(received(&readings)["index"], json!(255 + 8 * i)));
@@ -110,6 +114,7 @@ fn a_controller_gets_each_reading_and_each_alarm_as_a_datagram() {
     let frame: Value = serde_json::from_str(&live.frame(cursor).0).unwrap();
     assert_eq!(frame["readings"], json!([]));
     let hello: Value = serde_json::from_str(&live.hello()).unwrap();
+    assert_eq!(hello["names"], json!(["north"]));
     assert_eq!((&hello["rate_hz"], &hello["limits"]["delay_s"]), (&json!(256.0), &json!(0.02)));
     assert_eq!(hello["limits"]["amplitude"], Value::Null);
     let kinds = hello["alarm_kinds"].as_array().unwrap();
@@ -119,6 +124,8 @@ fn a_controller_gets_each_reading_and_each_alarm_as_a_datagram() {
     sender.send(512, 0.040);
     let raised = received(&alarms);
     assert_eq!((&raised["alarm"]["name"], &raised["alarm"]["raised"]), (&json!("delay"), &json!(true)));
+    assert_eq!(whose(&raised["alarm"]), north);
+    assert!(raised["alarm"]["text"].as_str().unwrap().starts_with("advisory: north: lag of up to"), "{raised}");
     sender.send(512, 0.010);
     until("all received", || live.summary().totals.tally.received == 1536);
     until("a latched alarm", || live.status().contains("\"active\":false,\"latched\":true"));
@@ -136,7 +143,10 @@ fn a_controller_gets_each_reading_and_each_alarm_as_a_datagram() {
         (&json!("alarms reset"), &json!(0))
     );
     let values = &event("alarm_raised")["values"];
-    assert_eq!((&values["alarm"], &values["actuator"], &values["limit"]), (&json!("delay"), &json!(0), &json!(0.02)));
+    assert_eq!((&values["alarm"], &values["limit"]), (&json!("delay"), &json!(0.02)));
+    assert_eq!(whose(values), north);
+    assert_eq!(event("alarm_raised")["text"], raised["alarm"]["text"]);
+    assert_eq!([whose(&status["readings"][0]), whose(&status["alarms"][0])], [north.clone(), north.clone()]);
     assert_eq!(event("alarm_over")["values"]["alarm"], json!("delay"));
     assert!(live.alarmed());
 
@@ -181,7 +191,7 @@ fn garbage_beside_good_samples_changes_nothing_and_is_counted() {
         live.stop();
         let line = |logged: &LoggedReading| {
             let mut out = String::new();
-            rthstrack_live::json::reading(&mut out, &logged.reading);
+            rthstrack_live::json::reading(&mut out, &logged.reading, &Names::new(&[], 1));
             out
         };
         let readings: Vec<String> = live.take_readings().iter().map(line).collect();

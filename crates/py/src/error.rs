@@ -16,7 +16,7 @@ pub(crate) fn to_py(py: Python<'_>, error: &Error) -> PyErr {
 
 /// The same for one of several actuators, which the message names.
 pub(crate) fn of_actuator(py: Python<'_>, actuator: usize, error: &Error) -> PyErr {
-    with_message(py, error, format!("actuator {actuator}: {error}"))
+    with_message(py, error, format!("actuator {}: {error}", actuator + 1))
 }
 
 fn with_message(py: Python<'_>, error: &Error, message: String) -> PyErr {

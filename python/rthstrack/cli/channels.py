@@ -89,7 +89,10 @@ def _listing(file: str, block: int | None, lines: tuple[int, int] | None) -> dic
             }
             for i, channel in enumerate(recording.channels)
         ],
-        "proposed": [{"target": target, "measured": measured} for target, measured in pairs],
+        "proposed": [
+            {"actuator_number": number, "target": target, "measured": measured}
+            for number, (target, measured) in enumerate(pairs, start=1)
+        ],
         "proposal": why,
         "notes": list(recording.notes),
     }
@@ -137,8 +140,15 @@ def _table(listing: dict[str, Any]) -> str:
         lines.append("  " + "  ".join(cells).rstrip())
     rate = listing["rate_hz"]
     lines.append(f"  rate: {f'{rate:.10g} Hz, from ' if rate else 'not known: '}{listing['rate_source']}")
-    pairs = ", ".join(f"--target '{p['target']}' --measured '{p['measured']}'" for p in listing["proposed"])
-    lines.append(f"  likely pair: {pairs} ({listing['proposal']})" if pairs else f"  {listing['proposal']}")
+    pairs = [f"--target '{p['target']}' --measured '{p['measured']}'" for p in listing["proposed"]]
+    if len(pairs) > 1:
+        lines.append(f"  likely pairs ({listing['proposal']}):")
+        lines += [
+            f"    actuator {i} ({p['target']}): {pair}"
+            for i, (p, pair) in enumerate(zip(listing["proposed"], pairs, strict=True), start=1)
+        ]
+    else:
+        lines.append(f"  likely pair: {pairs[0]} ({listing['proposal']})" if pairs else f"  {listing['proposal']}")
     lines += [f"  note: {note}" for note in listing["notes"]]
     return "\n".join(lines)
 

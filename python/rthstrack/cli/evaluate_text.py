@@ -26,6 +26,14 @@ SORTED_BY = ("worst", "given", "file", "delay", "amplitude", "error")
 
 _PARTS = {"whole": "", "compensator": "compensator: ", "actuator": "actuator: "}
 _COLOURS = {"passed": "bold green", "exceeded": "bold red", "not_judged": "bold yellow"}
+# In what least squares as asked for may differ from the trusted estimate.
+_APART = {
+    "detrend": "detrend",
+    "data_decimation": "P =",
+    "frequency_decimation": "Q =",
+    "decimator": "decimator",
+    "weight_power": "weight power",
+}
 
 
 def print_text(results: Sequence[Sequence[Assessment]], n_files: int, sort: str) -> None:
@@ -65,7 +73,8 @@ def _print_one(console: Console, a: Assessment, *, several: bool) -> None:
         ("file", f"{a.file}, {t.n_samples} samples at {a.rate_hz:g} Hz ({a.settings.get('rate_source', 'given')})"),
         ("target, measured", f"{a.target_name}, {a.measured_name}"),
         ("phase", _number(math.degrees(float(t.phase_rad)), ".5g", " degrees")),
-        ("bins", f"{t.n_bins}, every {t.delta_f_hz:.4g} Hz{band}"),
+        ("judged at", "the mean frequency of the motion, weighted by its energy (equivalent frequency)"),
+        ("frequency bins", f"{t.n_bins}, every {t.delta_f_hz:.4g} Hz{band}"),
         *_reason_rows(a),
         *([("P and Q chosen", a.factors.sentence)] if a.factors else []),
         *([("a larger Q", a.factors.windowed.sentence)] if a.factors and a.factors.windowed else []),
@@ -101,7 +110,7 @@ def _side_by_side(a: Assessment) -> Table:
             "delay",
             [_estimate(1e3 * float(t.delay_s), [1e3 * end for end in t.delay_interval_s], "ms") for t in columns],
         ),
-        ("at", [_number(float(t.equivalent_frequency_hz), ".5g", " Hz") for t in columns]),
+        ("judged at", [_number(float(t.equivalent_frequency_hz), ".5g", " Hz") for t in columns]),
     ]
     for label, cells in rows:
         table.add_row(label, *map(Text, cells))
@@ -109,13 +118,18 @@ def _side_by_side(a: Assessment) -> Table:
 
 
 def _heading(a: Assessment, t: Tracking) -> str:
-    """What an estimate is called; two of one estimator by what is subtracted before."""
+    """What an estimate is called; two of least squares with the settings in which they differ."""
+    apart = ""
+    if a.tracking.settings.estimator == "least_squares" and t.settings.estimator == "least_squares":
+        ours, theirs = a.tracking.settings, a.trusted.settings
+        apart = ", ".join(
+            f"{label} {getattr(t.settings, name)}"
+            for name, label in _APART.items()
+            if getattr(ours, name) != getattr(theirs, name)
+        )
     if t is a.trusted:
-        said = "trusted (least squares"
-        differs = a.tracking.settings.estimator == "least_squares" and a.tracking is not a.trusted
-        return f"{said}, detrend {t.settings.detrend}), 95 % interval" if differs else f"{said}), 95 % interval"
-    called = display.estimator_in_full(t.settings.estimator)
-    return f"{called}, detrend {t.settings.detrend}" if t.settings.estimator == "least_squares" else called
+        return f"trusted (least squares{apart and f', {apart}'}), 95 % interval"
+    return f"least squares as asked for ({apart})" if apart else display.estimator_in_full(t.settings.estimator)
 
 
 def _estimate(value: float, interval: Iterable[float], unit: str = "") -> str:
@@ -139,7 +153,7 @@ def _windows_text(a: Assessment, moving: MovingTracking) -> str:
     (low, high), (small, large) = np.quantile(delays, (0.1, 0.9)), np.quantile(amplitudes, (0.1, 0.9))
     return (
         f"of {moving.window_s:g} s{_moving_factors(a, moving)}: delay {low:.4g} to {high:.4g} ms, "
-        f"amplitude {small:.4g} to {large:.4g} (10 to 90 % of {known.sum()} readings)"
+        f"amplitude {small:.4g} to {large:.4g} (the middle 80 % of {known.sum()} readings)"
     )
 
 
@@ -158,17 +172,18 @@ def _reason_rows(a: Assessment) -> list[tuple[str, str]]:
 
 
 def _index_rows(a: Assessment) -> list[tuple[str, str]]:
-    """The indices that there are, those of one name in one row."""
+    """The indices that there are, each with a word of what it is."""
     own = {"unit": a.unit, "unit2": f"{a.unit}^2" if a.unit else None}
-    rows: dict[str, list[str]] = {}
-    for _, field, unit, scale, percent, _, name in display.INDICES:
+    target, measured = display.signal_roles(a.part)
+    rows = []
+    for _, field, unit, scale, percent, meaning, name in display.INDICES:
         value = getattr(a.indices, field)
         if value is None:
             continue
         text = f"{scale * value:{'.3g' if unit == '%' else '.4g'}} {own.get(unit, unit) or ''}".rstrip()
-        beside = "" if percent is None else f" ({getattr(a.indices, percent):.3g} %)"
-        rows.setdefault(name, []).append(text + beside)
-    return [(name, ", ".join(texts)) for name, texts in rows.items()]
+        share = "" if percent is None else f"{getattr(a.indices, percent):.3g} % "
+        rows.append((name, f"{text} ({share}{meaning.format(target=target, measured=measured)})"))
+    return rows
 
 
 def _moving_rows(a: Assessment) -> list[tuple[str, str]]:
@@ -176,7 +191,7 @@ def _moving_rows(a: Assessment) -> list[tuple[str, str]]:
         return [("moving windows", a.moving_note or "")]
     rows = [("moving windows", _windows_text(a, a.moving))]
     if a.trusted_moving is not a.moving:
-        rows.append(("trusted, in them", _windows_text(a, a.trusted_moving)))
+        rows.append(("trusted, in windows", _windows_text(a, a.trusted_moving)))
     return rows
 
 

@@ -162,6 +162,7 @@ def _log(args: argparse.Namespace, plan: Plan, live: Live) -> Log | None:
             live,
             args.log,
             rate_hz=plan.monitor["rate_hz"],
+            names=plan.layout.names,
             units=plan.layout.units,
             settings=plan.settings(),
             say=say,
@@ -187,7 +188,7 @@ def _watch(
     args: argparse.Namespace, plan: Plan, live: Live, statuses: Iterator[dict[str, Any]], ended: Ended, about: str
 ) -> None:
     """Shows what happens until the run ends, and ends it."""
-    news = _News(plan.layout.names)
+    news = _News()
     stream = sys.stdout if sys.stdout.isatty() else sys.stderr
     viewed: list[str] = []
     if _is_viewed(args):
@@ -241,14 +242,11 @@ def _is_viewed(args: argparse.Namespace) -> bool:
 class _News:
     """The events of a status that were not in the last one."""
 
-    def __init__(self, names: tuple[str, ...]) -> None:
-        self._names = names
+    def __init__(self) -> None:
         self._known: dict[tuple[Any, str], None] = {}
 
     def of(self, status: Mapping[str, Any]) -> Iterator[tuple[str, bool]]:
         """Lines, and whether each is an alarm's."""
-        from rthstrack.live.view import named
-
         for event in status["events"]:
             key = (event["time_s"], event["text"])
             # What the log says of itself is told where it happens.
@@ -256,8 +254,7 @@ class _News:
                 continue
             self._known[key] = None
             head = "ALARM " if event["code"] == "alarm_raised" else ""
-            text = named(event["text"], event["values"].get("actuator"), self._names)
-            yield f"{head}{_at(event['time_s'])}{text}", event["code"] in _OF_ALARMS
+            yield f"{head}{_at(event['time_s'])}{event['text']}", event["code"] in _OF_ALARMS
         # A status has recent events only; so many are enough to know them by.
         while len(self._known) > 1024:
             del self._known[next(iter(self._known))]

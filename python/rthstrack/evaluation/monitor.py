@@ -26,10 +26,11 @@ if TYPE_CHECKING:
 class Readings(_Numbers["NDArray[np.float64]", "NDArray[np.float64]"]):
     """Readings of one call, a row an actuator and window; intervals with (low, high) last.
 
-    `index` is that of the sample that completed the window, `time_s` its time from sample 0, `centre_s` the window's
-    centre in the same time, the decimator's delay taken out. The numbers are those of `Tracking`. Where `valid` is
-    False they are NaN and `reason` says why; where it is True it says why there is no interval, or is empty.
-    `reason_code` is its name, which never changes, `reason_values` what it says in numbers, in SI units.
+    `actuator` counts from 0. `index` is that of the sample that completed the window, `time_s` its time from sample 0,
+    `centre_s` the window's centre in the same time, the decimator's delay taken out. The numbers are those of
+    `Tracking`. Where `valid` is False they are NaN and `reason` says why; where it is True it says why there is no
+    interval, or is empty. `reason_code` is its name, which never changes, `reason_values` what it says in numbers, in
+    SI units.
     """
 
     index: NDArray[np.int64]
@@ -51,6 +52,7 @@ class Readings(_Numbers["NDArray[np.float64]", "NDArray[np.float64]"]):
 
     def _columns(self) -> dict[str, Any]:
         columns: dict[str, Any] = {name: getattr(self, name) for name in ("index", "time_s", "centre_s", "actuator")}
+        columns["actuator_number"] = self.actuator + 1
         columns |= self._number_columns() | {"valid": self.valid}
         return columns | {name: list(getattr(self, name)) for name in ("reason", "reason_code", "reason_values")}
 

@@ -113,7 +113,7 @@ class Tracking(_Numbers[_Number, _Interval], Generic[_Number, _Interval, _Fei, _
         same = {name: getattr(self, name) for name in ("n_bins", "delta_f_hz", "rate_hz", "n_samples")}
         same |= dataclasses.asdict(self.settings)
         return (
-            {"actuator": np.arange(n)}
+            {"actuator": np.arange(n), "actuator_number": np.arange(1, n + 1)}
             | self._number_columns()
             | {"fei": np.atleast_1d(np.asarray(self.fei))}
             | {name: list(values) for name, values in each.items()}
@@ -166,6 +166,7 @@ class MovingTracking(_Numbers["NDArray[np.float64]", "NDArray[np.float64]"]):
         columns: dict[str, Any] = {
             "time_s": np.repeat(self.time_s, n_actuators),
             "actuator": np.tile(np.arange(n_actuators), self.time_s.size),
+            "actuator_number": np.tile(np.arange(1, n_actuators + 1), self.time_s.size),
         }
         columns |= self._number_columns() | {"valid": self.valid.reshape(-1)}
         for name in ("reason", "reason_code", "reason_values"):
@@ -380,7 +381,7 @@ def _each_actuator(
     measured: NDArray[np.float64],
     call: Callable[[NDArray[np.float64], NDArray[np.float64]], _T],
 ) -> list[_T]:
-    """Applies `call` to each column; an error names the actuator."""
+    """Applies `call` to each column; an error names the actuator, from 1."""
     if target.ndim == 1:
         return [call(target, measured)]
     found = []
@@ -388,7 +389,7 @@ def _each_actuator(
         try:
             found.append(call(np.ascontiguousarray(target[:, a]), np.ascontiguousarray(measured[:, a])))
         except RthstrackError as error:
-            raise error.reworded(f"actuator {a}: {error}") from None
+            raise error.reworded(f"actuator {a + 1}: {error}") from None
     return found
 
 

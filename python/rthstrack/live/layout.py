@@ -149,7 +149,7 @@ class DatagramLayout(_Layout[Field]):
     def check_range(self, name: str, actuator: int, values: NDArray[np.float64]) -> None:
         """Raises SettingError where `values` of target or measured (the name) cannot be written as the layout says."""
         field: Field = getattr(self.actuators[actuator], name)
-        what = f"{name} of actuator {actuator} cannot be sent as {field.type}"
+        what = f"{name} of {self.actuators[actuator].name} cannot be sent as {field.type}"
         if not field.type.startswith("f") and not np.isfinite(values).all():
             raise SettingError(
                 f"{what}: it has samples that are NaN or infinite", advice="{fill} interpolates short gaps"
@@ -269,7 +269,7 @@ def _packed(root: Table) -> tuple[Field | None, tuple[Channels[Field], ...], int
     counter, roles, n = _fields(root)
     actuators = tuple(
         Channels(Field(t * size, kind, scale), Field(m * size, kind, scale), f"actuator {i}", unit)
-        for i, (t, m) in enumerate(roles)
+        for i, (t, m) in enumerate(roles, start=1)
     )
     return None if counter is None else Field(counter * size, kind), actuators, n * size
 
@@ -352,7 +352,7 @@ def _actuators(root: Table, place: Callable[[Table, str], Place | None]) -> tupl
     if not tables and root.values["actuator"] == []:
         root.note("actuator", "expected at least one")
     found = []
-    for i, table in enumerate(tables):
+    for i, table in enumerate(tables, start=1):
         name, unit = table.take("name", _TEXT, f"actuator {i}"), table.take("unit", _TEXT, None)
         target, measured = place(table, "target"), place(table, "measured")
         table.close()
@@ -409,7 +409,8 @@ def _line(root: Table) -> LineLayout | None:
         place, roles, _ = _fields(root)
         counter: str | int | None = place
         actuators = tuple(
-            Channels(Column(t, scale), Column(m, scale), f"actuator {i}", unit) for i, (t, m) in enumerate(roles)
+            Channels(Column(t, scale), Column(m, scale), f"actuator {i}", unit)
+            for i, (t, m) in enumerate(roles, start=1)
         )
     else:
         counter = _counter_column(root)

@@ -4,9 +4,10 @@ Samples, FILE: `index` (of the sample since the start), `time_s`, `counter` (as 
 received but put on a straight line over a short gap), `target_1`, `measured_1`, `target_2`, ... in the user's unit. A
 gap too long to be filled is a step in `index`.
 
-Readings, FILE with `.readings` before its suffix: a row a reading, `index` to `reason` as in the JSON lines (intervals
-as `amplitude_low`, `amplitude_high`, `delay_low_s`, `delay_high_s`), then the totals at that time, `received`, `lost`,
-`repeated`, `reordered`, `malformed`, and `alarms`, the names of those raised.
+Readings, FILE with `.readings` before its suffix: a row a reading, `index` to `reason` as in the JSON lines (`actuator`
+from 0, `actuator_number` from 1, `actuator_name`; intervals as `amplitude_low`, `amplitude_high`, `delay_low_s`,
+`delay_high_s`), then the totals at that time, `received`, `lost`, `repeated`, `reordered`, `malformed`, and `alarms`,
+the names of those raised.
 
 The schemas' metadata have `program`, `version`, `content`, `started` (UTC), `settings` (JSON), and of
 samples `rate_hz`.
@@ -37,6 +38,8 @@ from rthstrack.recording.readers.arrow import END_OF_STREAM, SAMPLE_LOG
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from numpy.typing import NDArray
+
 # What came is fetched so often; it is what a kill may cost.
 PERIOD_S = 0.2
 _TOTALS = ("received", "lost", "repeated", "reordered", "malformed")
@@ -58,7 +61,8 @@ def readings_path(path: Path) -> Path:
 class Log:
     """Two streams that exist, with their schemas, once constructed, and grow between `start` and `stop`.
 
-    units: of each actuator's channels, None where not stated. say: called with one line if logging stops.
+    names: of the actuators. units: of each one's channels, None where not stated. say: called with one line if logging
+    stops.
     Errors: OSError where a file cannot be made; FileExistsError where one is there already and is not empty.
     """
 
@@ -68,11 +72,13 @@ class Log:
         path: Path,
         *,
         rate_hz: float,
+        names: Sequence[str],
         units: Sequence[str | None],
         settings: Mapping[str, Any],
         say: Callable[[str], None],
     ) -> None:
         self._source = source
+        self._names = np.array(names, dtype=object)
         self._say = say
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
@@ -131,7 +137,7 @@ class Log:
             return
         try:
             self._samples.append(_sample_columns(samples))
-            self._readings.append(_reading_columns(readings))
+            self._readings.append(_reading_columns(readings, self._names))
         except Exception as error:
             self._fail(error)
 
@@ -231,6 +237,8 @@ def _reading_fields() -> list[Any]:
         number("time_s"),
         number("centre_s"),
         pa.field("actuator", pa.int64()),
+        pa.field("actuator_number", pa.int64()),
+        pa.field("actuator_name", pa.string()),
         *(number(one) for name in LIVE_NUMBERS for one in _logged(name)),
         pa.field("valid", pa.bool_()),
         pa.field("reason", pa.string()),
@@ -246,12 +254,13 @@ def _logged(name: str) -> tuple[str, ...]:
     return end_names(name.replace("_interval", "")) if is_interval(name) else (name,)
 
 
-def _reading_columns(taken: Mapping[str, Any]) -> list[Any]:
+def _reading_columns(taken: Mapping[str, Any], names: NDArray[np.object_]) -> list[Any]:
     def column(name: str, kind: Any) -> Any:
         return pa.array(np.asarray(taken[name], dtype=kind))
 
     columns = [column("index", np.int64), column("time_s", np.float64), column("centre_s", np.float64)]
-    columns.append(column("actuator", np.int64))
+    actuator = np.asarray(taken["actuator"], dtype=np.int64)
+    columns += [pa.array(actuator), pa.array(actuator + 1), pa.array(names[actuator], pa.string())]
     for name in LIVE_NUMBERS:
         values = np.asarray(taken[name], dtype=np.float64)
         ends = values.reshape(-1, 2).T if is_interval(name) else [values]

@@ -124,19 +124,12 @@ def shown(
     room = max(0, height - len(top) - len(keys))
     last = [_line(line, "dim") for line in events]
     # Alarms may take all but a few lines of the table and the latest events.
-    alarms = _alarms(status, names, width, max(room - min(1 + len(names), 5) - min(2, len(last)), (room + 1) // 2))
+    alarms = _alarms(status, width, max(room - min(1 + len(names), 5) - min(2, len(last)), (room + 1) // 2))
     room -= len(alarms)
     table = _actuators(status, names, unjudged_s, width, room - min(2, len(last)))
     room -= 0 if table is None else table.row_count + 1
     spaced = [Text("")] if room > len(last) else []
     return Group(*top, *alarms, *([] if table is None else [table]), *spaced, *last[max(0, len(last) - room) :], *keys)
-
-
-def named(text: str, actuator: int | None, names: Sequence[str]) -> str:
-    """The monitor's text of an actuator, which it knows by its number, with the actuator called by its name."""
-    if actuator is None or actuator >= len(names):
-        return text
-    return text.replace(f"actuator {actuator}:", f"{names[actuator]}:", 1)
 
 
 def _line(text: str, style: str) -> Text:
@@ -155,14 +148,14 @@ def _raised(status: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     return sorted(raised, key=lambda alarm: not alarm["active"])
 
 
-def _alarms(status: Mapping[str, Any], names: Sequence[str], width: int, most: int) -> list[Text]:
+def _alarms(status: Mapping[str, Any], width: int, most: int) -> list[Text]:
     """Lines of the alarms, at most so many, the last of which says what did not fit."""
     raised = _raised(status)
     # A line each where the width does not do for more, and cut only there.
     lines: list[Text] = []
     for n, alarm in enumerate(raised):
         over = "" if alarm["active"] else " (over, held until it is reset)"
-        text = f"ALARM {printable(named(alarm['text'], alarm['actuator'], names))}{over}"
+        text = f"ALARM {printable(alarm['text'])}{over}"
         fitting = textwrap.wrap(text, max(width, 20), subsequent_indent="  ")
         is_last = n == len(raised) - 1
         if len(lines) + len(fitting) > most - (not is_last):

@@ -157,7 +157,7 @@ def pairs_of(sources: Source | Sequence[Source] | Mapping[str, Source], truth: T
 
 
 def _named(name: str, actuator: int, n_actuators: int) -> str:
-    return name if n_actuators == 1 else f"{name}, actuator {actuator}"
+    return name if n_actuators == 1 else f"{name}, actuator {actuator + 1}"
 
 
 def _pairs_of_run(run: Run, name: str) -> list[Pair]:

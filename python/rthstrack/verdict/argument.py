@@ -39,6 +39,7 @@ _ADVICE = {
     "no_convergence": "; judge only the frequencies at which target moves (--band)",
     "opposite_sign": " (--scale CHANNEL=-1 turns one round)",
 }
+_ENDS_APART = "the record cuts target and measured at different points of the motion"
 _NAMES = {
     "fei": "the published average",
     "aligned": "the aligned average",
@@ -96,7 +97,8 @@ def argument(
     if not which:
         if judged is trusted:
             return Argument(f"{this}{slowly}; {ours} agrees with it {_how_well(beside, trusted)}")
-        return Argument(f"{ours} agrees with the trusted estimate {_how_well(beside, trusted)}{slowly}")
+        without = f" ({trusted.reason})" if trusted.reason else ""
+        return Argument(f"{ours} agrees with the trusted estimate {_how_well(beside, trusted)}{without}{slowly}")
     causes = [_cause(target, beside, trusted, name, variants, found) for name in which]
     if len({change for change, _, _ in causes}) == 1:
         # One cause, told of the number that is off by most.
@@ -106,10 +108,10 @@ def argument(
         gaps = [f"{_gap(name, beside, trusted)}, {text}" for name, (_, _, text) in zip(which, causes, strict=True)]
     told = next((warning for _, warning, _ in causes if warning is not None), None)
     if judged is trusted:
-        return Argument(f"{this}{slowly}; {ours} is {', and '.join(gaps)}", told)
+        return Argument(f"{this}{slowly}; {ours} gives {', and '.join(gaps)}", told)
     # What follows the target is told by how gain and delay change.
     without = f"; {trusted.reason}" if trusted.reason_code not in ("", "residual_follows_target") else ""
-    return Argument(f"use the trusted estimate: {ours} is {', and '.join(gaps)}{slowly}{without}", told)
+    return Argument(f"use the trusted estimate: {ours} gives {', and '.join(gaps)}{slowly}{without}", told)
 
 
 def _advised(missing: Said, trusted: Tracking) -> str:
@@ -125,7 +127,7 @@ def _advised(missing: Said, trusted: Tracking) -> str:
 
 def _how_well(tracking: Tracking, trusted: Tracking) -> str:
     if trusted.reason:
-        return f"to a hundredth ({trusted.reason})"
+        return "within 1 %"
     inside = all(
         low <= ours <= high
         for ours, (low, high) in (
@@ -134,10 +136,10 @@ def _how_well(tracking: Tracking, trusted: Tracking) -> str:
         )
     )
     if not inside:
-        return "to a thousandth"
+        return "within 0.1 %"
     low, high = (1e3 * float(end) for end in trusted.delay_interval_s)
     if (high - low) / 2 > _WIDE_INTERVAL * 1e3 * abs(float(trusted.delay_s)):
-        return f"within its interval, but that is wide: {low:.2g} to {high:.2g} ms"
+        return f"within its interval, which is wide ({low:.2g} to {high:.2g} ms)"
     return "within its interval"
 
 
@@ -149,18 +151,18 @@ def _averages(tracking: Tracking, trusted: Tracking, name: str = "delay_s") -> s
         return f"{1e3 * value:.3g} ms" if name == "delay_s" else f"{value:.3g}"
 
     if tracking is trusted or name not in _differences(tracking, trusted):
-        return f"{text(trusted)} is an average of it"
+        return f"{text(trusted)} is its average"
     which = {"fei": "published", "aligned": "aligned"}.get(tracking.settings.estimator, "as asked for")
-    return f"{text(tracking)} ({which}) and {text(trusted)} (trusted) are two averages of it"
+    return f"{text(tracking)} ({which}) and {text(trusted)} (trusted) are two different averages of it"
 
 
 def _gap(name: str, tracking: Tracking, trusted: Tracking) -> str:
-    """How far the estimate is from the trusted one: 0.026 ms below, 1.2 % above."""
+    """How far the estimate is from the trusted one: 0.026 ms less, 1.2 % more amplitude."""
     ours, theirs = float(getattr(tracking, name)), float(getattr(trusted, name))
-    where = "above" if ours > theirs else "below"
+    than = "more" if ours > theirs else "less"
     if name == "delay_s":
-        return f"{_percent(1e3 * abs(ours - theirs))} ms {where}"
-    return f"{_percent(100 * abs(ours / theirs - 1))} % {where} in amplitude"
+        return f"{_percent(1e3 * abs(ours - theirs))} ms {than}"
+    return f"{_percent(100 * abs(ours / theirs - 1))} % {than} amplitude"
 
 
 def _relative(name: str, tracking: Tracking, trusted: Tracking) -> float:
@@ -189,7 +191,7 @@ def _cause(
     remains = {change: abs(reading - theirs) / abs(ours - theirs) for change, reading in readings.items()}
     if remains.get("bad_samples", 1.0) < _EXPLAINED and "bad_samples" in found:
         # All else that is tried still holds them.
-        return "bad_samples", "bad_samples", f"as {found['bad_samples'].cause}"
+        return "bad_samples", "bad_samples", f"because {found['bad_samples'].cause}"
     suspects = [change for change in ("detrend", "window", "band") if remains.get(change, 1.0) < _EXPLAINED]
     if remains.get("average", 1.0) < _FORETOLD:
         suspects.append("average")
@@ -197,12 +199,12 @@ def _cause(
     if not suspects and remains.get("estimator", 1.0) < _EXPLAINED:
         suspects = ["estimator"]
     if not suspects:
-        return None, None, "which neither drift, window, noise nor wide phases explain alone"
+        return None, None, "and no single cause (drift, window, noise or large phases) explains that"
     # Noise on target that is there, and explains it, needs no help by the record's ends.
     noisy = "target_noise" in found
     by_bins = "average" in suspects or "band" in suspects
     if noisy and not by_bins and averaged is not None and abs(ours - averaged[1]) < _EXPLAINED * abs(ours - theirs):
-        return "target_noise", None, "as target's own noise counts as motion"
+        return "target_noise", None, "because noise on target counts as motion"
     first = [name for name in ("average", "band") if name in suspects and (noisy or name == "average")]
     cause = first[0] if first else min(suspects, key=remains.__getitem__)
     by_noise = 0.0
@@ -212,28 +214,28 @@ def _cause(
         if by_noise > 1 - _MINOR and "band" in suspects:
             cause = "band"  # the same, with a remedy
     if cause == "average":
-        noise = "target's own noise counts as motion"
+        noise = "noise on target counts as motion"
         if by_noise > 1 - _MINOR:
-            return "target_noise", None, f"as {noise}"
+            return "target_noise", None, f"because {noise}"
         frequency, weights = _of_motion(target, tracking, trusted)
         low, high = (360 * abs(float(trusted.delay_s)) * edge for edge in _middle(frequency, weights))
-        said = f"as it averages phases that spread from {_percent(low)} to {_percent(high)} degrees"
+        said = f"because it averages phases from {_percent(low)} to {_percent(high)} degrees"
         if low > 180:
-            said = f"as it takes phases of {low:.0f} to {high:.0f} degrees for less than half a turn"
+            said = f"because phases of {low:.0f} to {high:.0f} degrees, more than half a cycle, look smaller to it"
         return cause, None, said if by_noise < _MINOR else f"{said}, and {noise}"
     window = tracking.settings.window
     scale, unit = (1e3, " ms") if name == "delay_s" else (1.0, "")
-    reading = f"it reads {'d' if unit else 'A'} = {scale * readings[cause]:.4g}{unit}"
+    reading = f"it gives {'d' if unit else 'A'} = {scale * readings[cause]:.4g}{unit}"
     if cause == "estimator":
-        where = "its two ends act" if window == "boxcar" else f"the {window} window acts"
-        return cause, None, f"as {where} on different points of both motions: with --estimator aligned {reading}"
+        where = _ENDS_APART if window == "boxcar" else _window_apart(window)
+        return cause, None, f"because {where}: with --estimator aligned {reading}"
     if cause == "band":
         low, high = variants["band"].settings.band_hz or (0.0, math.inf)
         warning = "high_energy" if "high_energy" in found else None
         return (
             cause,
             warning,
-            f"as noise above {high:.3g} Hz counts as motion: with --band {low:g} {high:.3g} {reading}",
+            f"because noise above {high:.3g} Hz counts as motion: with --band {low:g} {high:.3g} {reading}",
         )
     remedy = (
         f"--detrend {variants[cause].settings.detrend}"
@@ -241,12 +243,16 @@ def _cause(
         else f"--window {variants[cause].settings.window}"
     )
     if cause == "window" and window != "boxcar":
-        return cause, None, f"as the {window} window acts on different points of both motions: with {remedy} {reading}"
+        return cause, None, f"because {_window_apart(window)}: with {remedy} {reading}"
     if "offset" in found:
-        return cause, "offset", f"as {found['offset'].cause}: with {remedy} {reading}"
+        return cause, "offset", f"because {found['offset'].cause}: with {remedy} {reading}"
     if "drift" in found:
-        return cause, "drift", f"as {found['drift'].cause}: with {remedy} {reading}"
-    return cause, None, f"as {_ends_apart(target)}: with {remedy} {reading}"
+        return cause, "drift", f"because {found['drift'].cause}: with {remedy} {reading}"
+    return cause, None, f"because {_ends_apart(target)}: with {remedy} {reading}"
+
+
+def _window_apart(window: str) -> str:
+    return f"the {window} window weighs target and measured at different points of the motion"
 
 
 def _middle(frequency: NDArray[np.float64], weights: NDArray[np.float64]) -> tuple[float, float]:
@@ -262,10 +268,10 @@ def _ends_apart(target: NDArray[np.float64]) -> str:
     mean, spread = float(target.mean()), float(target.std())
     first, last = (float(part.mean() - mean) / spread for part in (target[:n], target[-n:]))
     if max(abs(first), abs(last)) < _AT_MEAN:
-        return "its two ends act on different points of both motions"
+        return _ENDS_APART
     return (
-        f"target does not begin and end at its mean ({first:+.2g} and {last:+.2g} standard deviations), "
-        "which acts on it and on measured at different points of the motion"
+        f"target does not start and end at its mean ({first:+.2g} and {last:+.2g} standard deviations from it), and "
+        "the record cuts measured at other points of the motion"
     )
 
 

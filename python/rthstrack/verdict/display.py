@@ -32,13 +32,13 @@ ESTIMATORS = {"fei": "published", "aligned": "aligned", "least_squares": "least 
 #: The indices as they are shown: short name, field, unit, factor to it, field in percent, what it is, name in a table.
 INDICES = (
     ("MTE", "max_tracking_error", "unit", 1.0, "max_tracking_error_percent", "of the largest {target}",
-     "max tracking error"),
+     "max tracking error (MTE)"),
     ("RMS error", "rms_error", "unit", 1.0, "rms_error_percent", "of the RMS of {target}", "rms error"),
-    ("TI", "tracking_indicator", "unit2", 1.0, None, "tracking indicator at the end, rises on lag",
-     "tracking indicator"),
-    ("J1", "j1_s", "ms", 1e3, None, "lag of the correlation peak", "J1, J2, J3"),
-    ("J2", "j2_percent", "%", 1.0, None, "standard deviation of the error over that of {target}", "J1, J2, J3"),
-    ("J3", "j3_percent", "%", 1.0, None, "peak error over peak {target}", "J1, J2, J3"),
+    ("TI", "tracking_indicator", "unit2", 1.0, None, "at the end of the record; rises while {measured} lags",
+     "tracking indicator (TI)"),
+    ("J1", "j1_s", "ms", 1e3, None, "lag at the correlation peak", "J1"),
+    ("J2", "j2_percent", "%", 1.0, None, "standard deviation of the error over that of {target}", "J2"),
+    ("J3", "j3_percent", "%", 1.0, None, "largest error over largest {target}", "J3"),
     ("Energy error", "energy_error", "", 1.0, None, "work over {measured} less work over {target}", "energy error"),
 )  # fmt: skip
 

@@ -61,8 +61,8 @@ class Limits:
             name = "critical_delay_s" if row.kind is _CRITICAL else "limit_delay_s"
             milli = f"; {row.limit:g} ms is {row.limit / 1000:g} s" if row.limit / 1000 < longest_s else ""
             raise SettingError(
-                f"{name}: {row.limit:g} s can never be exceeded, as delays of up to {looked_for}, {longest_s:g} s, are "
-                f"looked for: expected less{milli}",
+                f"{name}: {row.limit:g} s can never be exceeded, because only delays up to {looked_for}, {longest_s:g} "
+                f"s, are looked for: expected less{milli}",
                 code="limit_never_exceeded",
                 values=(row.limit, longest_s),
             )
@@ -218,26 +218,33 @@ def _judged(
     found = f"{row.kind.called} {_told(row, whole)}"
     code = f"limit_{name}"
     if windows.state == EXCEEDED and worst is not None and (whole.state != EXCEEDED or worst.value > whole.value):
-        words = f"{row.kind.called} {_told(row, worst)} in the {windows.where} exceeds {asked}, {_spans(windows)}"
+        words = f"{row.kind.called} {_told(row, worst)} in the {windows.where} exceeds {asked} ({_spans(windows)})"
         return EXCEEDED, Said(words, code, (worst.value, limit))
     if whole.state == EXCEEDED:
         return EXCEEDED, Said(f"{found} exceeds {asked}", code, (whole.value, limit))
     if (why := _undetermined(tracking)) is not None:
         return NOT_JUDGED, Said(f"{row.kind.called} is not determined: {why}", "limit_undetermined")
     if (why := _undetermined(trusted)) is not None:
-        words = f"{found} is of the published average alone; the trusted estimate is not determined: {why}"
+        words = f"{found} is the published average; the trusted estimate is not determined: {why}"
         return NOT_JUDGED, Said(words, "limit_undetermined")
     if tracking is not trusted and _held_one(row, trusted).state != PASSED:
         words = f"{found} is within {asked}, but the trusted estimate, {_told(row, _held_one(row, trusted))}, is not"
         return NOT_JUDGED, Said(words, "limit_not_trusted")
     if whole.state == NOT_JUDGED:
-        return NOT_JUDGED, Said(f"{found} lies on both sides of {asked}", "limit_straddled", (whole.low, whole.high))
+        return NOT_JUDGED, Said(
+            f"{found} may be within or beyond {asked}: its interval contains the limit",
+            "limit_straddled",
+            (whole.low, whole.high),
+        )
     if windows.state == NOT_JUDGED:
         if worst is not None and windows.n_undetermined <= _MOST_UNJUDGED * windows.n_moving:
-            words = f"{row.kind.called} {_told(row, worst)} in the {windows.where} lies on both sides of {asked}"
+            words = (
+                f"{row.kind.called} {_told(row, worst)} in the {windows.where} may be within or beyond {asked}: "
+                "its interval contains the limit"
+            )
             return NOT_JUDGED, Said(words, "limit_straddled", (worst.low, worst.high))
         return NOT_JUDGED, Said(_missing(windows), "limit_windows", (windows.n_undetermined, windows.n_moving))
-    alone = "" if not math.isnan(whole.low) else ", by the number alone, as there is no interval"
+    alone = "" if not math.isnan(whole.low) else "; there is no interval, so only the number was compared"
     at_worst = "" if worst is None else f" (at worst {_told(row, worst)} in the {windows.where})"
     missing = f"; {_missing(windows)}" if windows.n_undetermined else ""
     return PASSED, Said(f"{found}{at_worst} is within {asked}{alone}{missing}", "limit_passed", (whole.value, limit))
@@ -341,7 +348,7 @@ def _spans(windows: _Windows) -> str:
     spans = windows.over_s
     first, last = spans[0]
     one = f"from {first:.4g} to {last:.4g} s" if first != last else f"at {first:.4g} s"
-    return f"over it {one}" if len(spans) == 1 else f"over it {len(spans)} times, first {one}"
+    return f"exceeded {one}" if len(spans) == 1 else f"exceeded {len(spans)} times, first {one}"
 
 
 def _told(row: _Row, held: Held) -> str:

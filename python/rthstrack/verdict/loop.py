@@ -53,12 +53,12 @@ class LoopEffect:
             share = _percent(self.share, self.share_interval)
             near = f"the delay is {share} of the critical {1e3 * self.critical_delay_s:.4g} ms"
         if not self.share > 0 and not self.damping_lost > 0:
-            return f"{near}; a lead takes no damping away"
+            return f"{near}; a lead takes away no damping"
         without = 100 * self.damping_ratio_without
         lost = _percent(self.damping_lost, self.damping_lost_interval)
         said = f"{near} and takes away {lost} of critical damping; the structure has {without:.3g} % at "
         said += f"{self.frequency_hz:.3g} Hz"
-        return said if self.exact else f"{said}, before anything yields"
+        return said if self.exact else f"{said} (all members taken as elastic)"
 
 
 def loop_effect(test: VirtualTest, tracking: Tracking) -> LoopEffect | None:

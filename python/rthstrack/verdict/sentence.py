@@ -70,24 +70,26 @@ def reason(tracking: Tracking) -> Said | None:
     # So wide that the number means nothing but that.
     if code == "uncertain" and tracking.n_samples / tracking.rate_hz < values[0] <= _BOUNDLESS_S:
         advice = "take a longer window or a band with less noise"
-        return undetermined(f"noise hides the delay altogether; {advice}", code, values)
+        return undetermined(f"the noise is too strong to find the delay; {advice}", code, values)
     return of_core(str(tracking.reason), code, values)
 
 
 def with_cause(tracking: Tracking, depends: Dependence | None) -> Tracking:
-    """The same, its reason with the cause that was found: what noise on target leaves follows target, too."""
+    """The same, its reason with the cause that was found; noise on target makes the residual follow target, too."""
     if tracking.reason_code != "residual_follows_target":
         return tracking
     if depends is not None:
-        over = {"amplitude": "amplitude", "frequency": "frequency"}.get(depends.kind, "time")
-        cause = f"so they are not constant over {over}"
+        over = {"amplitude": "with amplitude", "frequency": "with frequency"}.get(depends.kind, "over time")
+        words = (
+            "one gain and one delay do not explain measured (the residual follows target, coherence {:.2f}), so they "
+        )
+        words += f"change {over}"
     elif float(tracking.target_noise_std) > 0:
-        cause = "as noise on target does"
+        words = "noise on target makes the residual follow target (coherence {:.2f})"
     else:
         return tracking
     (coherence,) = cast("tuple[float]", tracking.reason_values)
-    words = f"no interval: what one gain and one delay leave still follows target (coherence {coherence:.2f}), {cause}"
-    return dataclasses.replace(tracking, reason=words)
+    return dataclasses.replace(tracking, reason=f"no interval: {words.format(coherence)}")
 
 
 def still_in_band(target: NDArray[np.float64], tracking: Tracking) -> Said | None:

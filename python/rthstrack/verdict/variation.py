@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 
 def _line(value: float, interval: tuple[float, float], factor: float, what: str) -> str:
-    """A slope with its interval: falling by 0.42 ms a hertz (0.40 to 0.44)."""
+    """A slope with its interval: falling by 0.42 ms per hertz (0.40 to 0.44)."""
     ends = sorted(factor * abs(end) for end in interval)
     if interval[0] <= 0 <= interval[1]:
-        return "bent over the frequencies"
+        return "curved"
     number, _, between = with_interval(factor * abs(value), ends).partition(" ")
-    return f"{'rising' if value > 0 else 'falling'} by {number}{what} a hertz {between}".rstrip()
+    return f"{'rising' if value > 0 else 'falling'} by {number}{what} per hertz {between}".rstrip()
 
 
 def _varying_slowly(s: FrequencySlopes | None) -> str:
@@ -95,7 +95,8 @@ def _course(d: Dependence, what: str, unit: str | None, start_s: float) -> str:
         assert d.clock_ppm is not None
         assert d.clock_ppm_interval is not None
         ppm = with_interval(abs(d.clock_ppm), sorted(abs(end) for end in d.clock_ppm_interval), "ppm")
-        return f"{at(first)} at the start and {at(second)} at the end, evenly over time, as of two clocks {ppm} apart"
+        ends = f"{at(first)} at the start and {at(second)} at the end"
+        return f"{ends}, changing evenly over time, as if two clocks differ by {ppm}"
     return f"{at(first)} at the start and {at(second)} at the end: it drifts over time"
 
 
@@ -111,5 +112,5 @@ def _along_line(line: Line, what: str) -> str:
     value = with_interval(scale * line.value, [scale * (line.value + side * line.misfit) for side in (-1, 1)])
     return (
         f"{value.partition(' (')[0]}{ms} at {line.at_hz:.2g} Hz, {slope} "
-        f"from {line.band_hz[0]:.2g} to {line.band_hz[1]:.2g} Hz, give or take {scale * line.misfit:.2g}{ms}"
+        f"from {line.band_hz[0]:.2g} to {line.band_hz[1]:.2g} Hz, within {scale * line.misfit:.2g}{ms} of a line"
     )

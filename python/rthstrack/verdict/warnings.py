@@ -121,7 +121,7 @@ def _wrap(tracking: Tracking, names: tuple[str, str]) -> Said | None:
         return None
     turn_s = 1 / float(tracking.equivalent_frequency_hz)
     return Said(
-        f"phase {math.degrees(phase):.0f} degrees is near half a turn: the delay may be off by a whole turn "
+        f"phase {math.degrees(phase):.0f} degrees is near half a cycle (180): the delay may be wrong by a whole cycle "
         f"({1e3 * turn_s:.0f} ms), or {names[1]} has the opposite sign (--scale '{names[1]}=-1')",
         "half_turn",
         (phase, turn_s),
@@ -192,7 +192,9 @@ def _drift(target: NDArray[np.float64], tracking: Tracking, duration_s: float) -
     if not blame:
         return None
     remedy = "--detrend linear" if residual > _OFFSET_STD * spread else "--detrend mean"
-    cause = f"{' and '.join(blame)} puts {100 * share:.0f} % of the weight below {edge:.2g} Hz, where phase says little"
+    put = "put" if len(blame) > 1 else "puts"
+    cause = f"{' and '.join(blame)} {put} {100 * share:.0f} % of the weight below {edge:.2g} Hz, "
+    cause += "where the phase tells little"
     return Said(f"{cause}: try {remedy} or --band", "drift", (share, edge), cause)
 
 
@@ -222,8 +224,8 @@ def _target_noise(target: NDArray[np.float64], trusted: Tracking, names: tuple[s
     if noise < _TARGET_NOISE * spread and _PULL * noise**2 < _SAME_DELAY_S * trusted.rate_hz * steps:
         return None
     return Said(
-        f"{names[0]} holds noise of its own, {_percent(100 * noise / spread)} % of its standard deviation: the trusted "
-        "estimate takes it into account, the published average does not (--band leaves less of it)",
+        f"{names[0]} contains noise, {_percent(100 * noise / spread)} % of its standard deviation: the trusted "
+        "estimate takes it into account, the published average does not (--band reduces it)",
         "target_noise",
         [noise / spread],
     )
@@ -247,8 +249,8 @@ def _coherence(tracking: Tracking, response: FrequencyResponse | None, names: tu
     if coherence >= _COHERENT:
         return None
     return Said(
-        f"coherence is only {coherence:.2f} over the frequencies that carry the weight: "
-        f"{names[1]} holds much that does not come from {names[0]}",
+        f"coherence is only {coherence:.2f} at the frequencies of the motion (1 is perfect): "
+        f"much of {names[1]} does not come from {names[0]}",
         "coherence",
         [coherence],
     )
@@ -273,7 +275,7 @@ def _delay_spread(tracking: Tracking, trusted: Tracking, response: FrequencyResp
         return None
     return Said(
         f"the delay is not one number: {1e3 * low:.3g} to {1e3 * high:.3g} ms between {frequency[0]:.2g} and "
-        f"{frequency[-1]:.2g} Hz; quote the curve of delay over frequency beside it",
+        f"{frequency[-1]:.2g} Hz; report the curve of delay over frequency beside it",
         "delay_spread",
         (low, high),
     )
@@ -299,7 +301,7 @@ def _bad_samples(trusted: Tracking, names: tuple[str, str]) -> Said | None:
     for bad in _of_one(trusted):
         name = names[0] if bad.channel == "target" else names[1]
         if bad.kind == "held":
-            said.append(f"{name} is refreshed every {_ordinal(bad.every)} sample only: the fresh ones are judged")
+            said.append(f"{name} has a new value only at every {_ordinal(bad.every)} sample: only those are judged")
             continue
         one, many = _BAD_WORDS[bad.kind]
         said.append(f"{name} has {bad.count} {one if bad.count == 1 else many}, the first at {bad.first_s:.6g} s")
@@ -307,7 +309,7 @@ def _bad_samples(trusted: Tracking, names: tuple[str, str]) -> Said | None:
     if not said:
         return None
     cause = "; ".join(said)
-    end = "; left out of the trusted estimate, not of the published average (--bad-samples keep keeps them)"
+    end = "; left out of the trusted estimate but not of the published average (--bad-samples keep keeps them)"
     return Said(cause + (end if left_out else ""), "bad_samples", [bad.count for bad in _of_one(trusted)], cause)
 
 
@@ -355,7 +357,7 @@ def _levels(target: NDArray[np.float64], name: str) -> Said | None:
     # What jumps through most of its range at once is a square wave.
     if float(np.median(steps[steps > 0])) > 0.5 * float(np.ptp(target)):
         return None
-    words = f"{name} is small: it takes only {n} distinct values, so quantisation limits what can be said"
+    words = f"{name} is small: it takes only {n} distinct values, so quantisation limits the accuracy"
     return Said(words, "few_levels", [n])
 
 
@@ -366,7 +368,7 @@ def _quiet(moving: MovingTracking | None, name: str) -> Said | None:
     if share < 0.5:
         return None
     return Said(
-        f"{name} is nearly still in {100 * share:.0f} % of the windows: the numbers speak for the rest "
+        f"{name} is nearly still in {100 * share:.0f} % of the windows: the numbers describe only the rest "
         f"(--start and --end cut the record)",
         "quiet",
         [share],

@@ -146,7 +146,8 @@ def true_tracking(
     """Amplitude and delay of measured over target as configured, at these frequencies (arrays of their shape).
 
     From compensation, gain, delay and dynamics; None where they are no one linear filter (a delay that varies, a
-    servo-hydraulic plant with a specimen that yields). The phase is unwrapped from zero frequency.
+    servo-hydraulic plant with a specimen that yields). The phase is unwrapped from zero frequency. `actuator` is the
+    index, from 0.
     """
     plan = _plan(test)
     frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))

@@ -3,6 +3,7 @@
 use rthstrack::Reading;
 
 use super::config::AlarmConfig;
+use crate::names::Names;
 
 /// What is known of an actuator or of the stream besides its readings; `None` where nothing is known now.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -95,7 +96,7 @@ kinds! {
         is_time: false,
         words: |value, limit| {
             let way = if value < 0.0 { "lead" } else { "lag" };
-            format!("{way} of up to {:.3} ms, limit {:.3} ms either way", 1e3 * value.abs(), 1e3 * limit)
+            format!("{way} of up to {:.3} ms, limit {:.3} ms", 1e3 * value.abs(), 1e3 * limit)
         },
     };
     /// |A - 1|.
@@ -139,7 +140,7 @@ kinds! {
         source: Source::Stream(|observed| observed.lost.map(|n| n as f64)),
         compared: |value| value,
         is_time: false,
-        words: |value, limit| format!("up to {value} samples missing from the last window, limit {limit}"),
+        words: |value, limit| format!("up to {value} samples are missing from the last window, limit {limit}"),
     };
     /// Seconds without a sample.
     Silence = Row {
@@ -164,7 +165,7 @@ kinds! {
         source: Source::Actuator(|observed| observed.unjudged_s),
         compared: |value| value,
         is_time: true,
-        words: |_, limit| format!("moves, and has not been judged for more than {limit:.1} s: no other alarm sees it"),
+        words: |_, limit| format!("moves but could not be judged for more than {limit:.1} s: no other alarm watches it now"),
     };
 }
 
@@ -180,17 +181,16 @@ impl Kind {
     }
 
     /// What it says of a value that was over the limit, as advice.
-    pub fn raised_text(self, actuator: Option<usize>, value: f64, limit: f64) -> String {
-        advice(actuator, &(self.row().words)(value, limit))
+    pub fn raised_text(self, actuator: Option<usize>, value: f64, limit: f64, names: &Names) -> String {
+        advice(actuator, names, &(self.row().words)(value, limit))
     }
 
     /// What it says when it is over.
-    pub fn over_text(self, actuator: Option<usize>) -> String {
-        advice(actuator, &format!("alarm '{}' is over", self.name()))
+    pub fn over_text(self, actuator: Option<usize>, names: &Names) -> String {
+        advice(actuator, names, &format!("alarm '{}' is over", self.name()))
     }
 }
 
-fn advice(actuator: Option<usize>, text: &str) -> String {
-    let whose = actuator.map_or_else(String::new, |a| format!("actuator {a}: "));
-    format!("advisory: {whose}{text}")
+fn advice(actuator: Option<usize>, names: &Names, text: &str) -> String {
+    format!("advisory: {}{text}", names.before(actuator))
 }

@@ -9,6 +9,8 @@ mod kind;
 
 use rthstrack::Reading;
 
+use crate::names::Names;
+
 pub use config::AlarmConfig;
 pub use kind::{Kind, Observed, Row, Source};
 
@@ -58,8 +60,8 @@ impl Alarm {
     }
 
     /// What it says, as advice.
-    pub fn text(&self) -> String {
-        self.kind.raised_text(self.actuator, self.value, self.limit)
+    pub fn text(&self, names: &Names) -> String {
+        self.kind.raised_text(self.actuator, self.value, self.limit, names)
     }
 
     fn compared(&self, value: f64) -> f64 {
@@ -341,12 +343,13 @@ pub(crate) mod tests {
     #[test]
     fn a_lead_is_told_as_one_and_compared_by_its_size() {
         let (_, alarms) = delays(AlarmConfig::default(), &[(1.0, -0.02), (2.0, -0.03), (3.0, -0.025)]);
-        let text = alarms.all()[0].text();
+        let text = alarms.all()[0].text(&Names::new(&[], 1));
         assert!(text.contains("lead of up to 30.000 ms"), "{text}");
         let config = AlarmConfig { limit_amplitude: Some(0.1), ..AlarmConfig::default() };
         let mut alarms = Alarms::new(config, 1);
         alarms.read(&reading(0, 1.0, 0.7, 0.0), |c| {
-            assert!(c.alarm.text().contains("too small by up to 0.300"), "{:?}", c)
+            let text = c.alarm.text(&Names::new(&[], 1));
+            assert!(text.contains("too small by up to 0.300"), "{text}");
         });
     }
 
@@ -361,11 +364,15 @@ pub(crate) mod tests {
 
     #[test]
     fn every_text_says_that_it_is_advisory() {
+        let names = Names::new(&["north".to_owned()], 2);
         for kind in Kind::ALL.iter().copied() {
-            let alarm = Alarm { value: 2.0, active: true, ..Alarm::new(kind, Some(1), 1.0) };
-            assert!(alarm.text().starts_with("advisory: actuator 1: "), "{}", alarm.text());
-            let over = kind.over_text(Some(1));
-            assert!(over.starts_with("advisory: actuator 1: ") && over.contains(kind.name()));
+            for (actuator, called) in [(0, "north"), (1, "actuator 2")] {
+                let alarm = Alarm { value: 2.0, active: true, ..Alarm::new(kind, Some(actuator), 1.0) };
+                for text in [alarm.text(&names), kind.over_text(Some(actuator), &names)] {
+                    assert!(text.starts_with(&format!("advisory: {called}: ")), "{text}");
+                }
+                assert!(kind.over_text(Some(actuator), &names).contains(kind.name()));
+            }
         }
     }
 

@@ -34,7 +34,7 @@
       if (run.alarms.length > 6) lines.push(element("li", "count", howMany));
       const order = [...run.alarms].sort((a, b) => Number(b.active) - Number(a.active));
       const called = ({ name, actuator }) =>
-        `${run.kinds.get(name)?.title ?? name}${actuator == null ? "" : ` · ${names[actuator] ?? actuator}`}`;
+        `${run.kinds.get(name)?.title ?? name}${actuator == null ? "" : ` · ${names[actuator] ?? ""}`}`;
       for (const alarm of order) {
         const line = element("li", alarm.active ? "active" : "latched");
         line.append(element("strong", "", called(alarm)));

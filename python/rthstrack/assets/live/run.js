@@ -14,7 +14,7 @@ const Run = (() => {
     const run = {
       hello,
       n,
-      names: Array.from({ length: n }, (_, a) => String((hello.names || [])[a] ?? `actuator ${a}`)),
+      names: Array.from({ length: n }, (_, a) => String((hello.names || [])[a] ?? `actuator ${a + 1}`)),
       limits: hello.limits || {},
       kinds: new Map(hello.alarm_kinds.map((kind) => [kind.name, kind])),
       /* Whether an alarm is about this one of the numbers shown. */
