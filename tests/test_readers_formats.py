@@ -602,7 +602,7 @@ def test_files_of_other_kinds_say_what_they_are(tmp_path: Path, name: str, conte
 def test_a_missing_file_a_directory_and_a_forbidden_file_are_named(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"none.csv: no such file$"):
         read_recording(tmp_path / "none.csv")
-    with pytest.raises(RecordingError, match="a directory; expected a file"):
+    with pytest.raises(RecordingError, match="a folder without recordings of its own; expected a file"):
         read_recording(tmp_path)
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(RecordingError, match="not a regular file"):

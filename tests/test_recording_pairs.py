@@ -195,7 +195,7 @@ def test_a_folder_is_taken_as_its_files_and_what_cannot_be_read_is_told_at_the_e
     assert out.count("likely pair") == 2
     assert err.count("\n") == 1
     assert main(["evaluate", str(runs / "more")]) == 1
-    assert "a directory; expected a file" in capsys.readouterr().err
+    assert "a folder without recordings of its own; expected a file" in capsys.readouterr().err
 
 
 def test_two_files_are_named_with_their_channels(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -32,7 +32,7 @@ from rthstrack.evaluation.results import json_ready
 from rthstrack.evaluation.tracking import Evaluator
 from rthstrack.recording.readers import FORMAT_NAMES
 from rthstrack.recording.recording import Recording
-from rthstrack.verdict.assessment import trusted_settings, without_trusted
+from rthstrack.verdict.assessment import MOVING_S, trusted_settings, without_trusted
 from rthstrack.verdict.entry import result_entry
 from rthstrack.verdict.limits import EXCEEDED as LIMIT_EXCEEDED
 from rthstrack.verdict.limits import NOT_JUDGED, Limits
@@ -58,7 +58,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         description="Judges how well the measured displacement followed the target, in amplitude and in time "
         "(Guo, Xu and Chen 2014). A positive delay means that measured lags. "
         "Exit status: 0 everything was evaluated and is within the limits, 1 some file failed, 2 misuse, 3 a limit was "
-        "exceeded or cannot be judged. Numbers may have a unit: 20ms, 0.02, 2kHz, 5%%.",
+        "exceeded or cannot be judged. Numbers may have a unit: 20ms, 0.02, 2kHz, 5%.",
     )
     parser.add_argument(
         "files", nargs="*", metavar="FILE", help=f"recorded test ({', '.join(FORMAT_NAMES)}), or a folder of them; "
@@ -120,7 +120,7 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
         }
         print(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False))
     else:
-        print_text(results, len(args.files), args.sort)
+        print_text(results, len(args.files), len(failures), args.sort)
     for _, error in failures:
         print(f"rthstrack: {told(error)}", file=sys.stderr)
     for note in notes:
@@ -212,6 +212,8 @@ def _check(args: argparse.Namespace, misuse: Callable[[str], Any]) -> None:
             Evaluator(1024, 1.0, one, data_decimation=few, frequency_decimation=1, band_hz=None)
     except SettingError as error:
         misuse(told(error))
+    if args.hop is not None and args.hop > (window_s := args.moving or MOVING_S):
+        misuse(f"--hop: expected at most the length of a window, {window_s:g} s, found {args.hop:g}")
     if args.critical_fraction is not None and args.critical_delay is None and args.structure is None:
         misuse("--critical-fraction speaks of the critical delay: give --critical-delay or --structure")
     if args.critical_delay is not None and args.structure is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
 from collections import Counter
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from rthstrack.said import coded
 from rthstrack.verdict.display import with_interval
+from rthstrack.verdict.limits import CANNOT_BE_JUDGED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -75,7 +77,7 @@ _COLUMNS = (
 )
 
 
-def print_many(console: Console, assessments: Sequence[Assessment], sort: str) -> None:
+def print_many(console: Console, assessments: Sequence[Assessment], n_failed: int, sort: str) -> None:
     """Prints the table, then what is odd, each kind once, and one closing line where limits were given."""
     from rich.text import Text
 
@@ -84,6 +86,9 @@ def print_many(console: Console, assessments: Sequence[Assessment], sort: str) -
     columns = [column for column in _COLUMNS if any(column.text(a) != "-" for a in found)]
     if any(a.outcome for a in found):
         columns.append(_Column("", 0, lambda a: _OUTCOMES[a.outcome]))
+    if any(gate.state == "exceeded" != gate.whole.state for a in found for gate in a.gates):
+        # What failed by a window alone is not understood without it.
+        columns = [dataclasses.replace(c, rank=0) if c.name == "worst window" else c for c in columns]
     cells = {column: [column.text(a) for a in found] for column in columns}
     widths = {column: max(len(column.name), *map(len, cells[column])) for column in columns}
     longest = max(map(len, (*names, "file")))
@@ -102,7 +107,14 @@ def print_many(console: Console, assessments: Sequence[Assessment], sort: str) -
         line = [f"{_cut(name, room):<{room}}", *(f"{cells[column][i]:>{widths[column]}}" for column in columns)]
         console.print(Text("  ".join(line).rstrip(), style=_STYLES[a.outcome]), no_wrap=True)
     _print_remarks(console, found, names)
-    if (closing := _closing(found, names)) is not None:
+    print_closing(console, found, names, n_failed)
+
+
+def print_closing(console: Console, found: Sequence[Assessment], names: Sequence[str], n_failed: int) -> None:
+    """Prints what was asked and found of all of them in one line, where limits were given."""
+    from rich.text import Text
+
+    if (closing := _closing(found, names, n_failed)) is not None:
         console.print(Text(closing[0], style=_STYLES[closing[1]]))
 
 
@@ -169,7 +181,7 @@ def _print_remarks(console: Console, found: Sequence[Assessment], names: Sequenc
         console.print(Text(f"{shown}: ", style="yellow") + Text(entries[0][1]))
 
 
-def _closing(found: Sequence[Assessment], names: Sequence[str]) -> tuple[str, str] | None:
+def _closing(found: Sequence[Assessment], names: Sequence[str], n_failed: int) -> tuple[str, str] | None:
     """What was asked and found of all of them, in one line, and its outcome."""
     counted = Counter(a.outcome for a in found if a.outcome is not None)
     if not counted:
@@ -178,6 +190,10 @@ def _closing(found: Sequence[Assessment], names: Sequence[str]) -> tuple[str, st
     n = sum(counted.values())
     worst, name = next((a, name) for a, name in zip(found, names, strict=True) if a.outcome == state)
     words = {"exceeded": "exceed a limit", "not_judged": "cannot be judged", "passed": "are within the limits"}
-    parts = [f"{counted[one]} of {n} {words[one]}" for one in (*_WORST, "passed") if counted[one]]
+    parts = [f"{counted[one]} of {n + n_failed} {words[one]}" for one in (*_WORST, "passed") if counted[one]]
     heading = worst.conclusion.partition(": ")[0]
+    if n_failed:
+        parts.insert(0, f"{n_failed} of {n + n_failed} could not be read")
+        if state == "passed":
+            state, heading = "not_judged", CANNOT_BE_JUDGED
     return f"{heading}: {', '.join(parts)}; {name}: {worst.conclusion.partition(': ')[2]}", state

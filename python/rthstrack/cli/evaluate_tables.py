@@ -85,10 +85,11 @@ def _readings(a: Assessment) -> Iterator[dict[str, Any]]:
     for i, time_s in enumerate(a.moving.time_s):
         row = {name: json_ready(getattr(a.moving, name)[i]) for name in _READING}
         for which, moving in others.items():
-            row |= {f"{which}_{name}": json_ready(getattr(moving, name)[i]) for name in _BESIDE}
+            known = moving is not None
+            row |= {f"{which}_{name}": json_ready(getattr(moving, name)[i]) if known else None for name in _BESIDE}
         for name, value in row.items():
             # No interval is no pair of missing ends.
-            if is_interval(name) and None in value:
+            if is_interval(name) and value is not None and None in value:
                 row[name] = None
         yield _flat(_about(a) | {"time_s": a.start_s + float(time_s)} | row)
 

@@ -6,7 +6,8 @@ import math
 import os
 from typing import TYPE_CHECKING
 
-from rthstrack.cli.evaluate_many import print_many
+from rthstrack.cli.evaluate_many import print_closing, print_many
+from rthstrack.cli.setting_options import spoken
 from rthstrack.verdict import display
 from rthstrack.verdict.display import with_interval
 from rthstrack.verdict.sentence import reason
@@ -36,8 +37,8 @@ _APART = {
 }
 
 
-def print_text(results: Sequence[Sequence[Assessment]], n_files: int, sort: str) -> None:
-    """Prints one file's results in full, many files' in a table."""
+def print_text(results: Sequence[Sequence[Assessment]], n_files: int, n_failed: int, sort: str) -> None:
+    """Prints one file's results in full, many files' in a table, and one closing line where limits were given."""
     from rthstrack.cli.output import Console
 
     console = Console()
@@ -46,9 +47,11 @@ def print_text(results: Sequence[Sequence[Assessment]], n_files: int, sort: str)
         several = len({a.actuator for a in found}) > 1
         for a in found:
             _print_one(console, a, several=several)
+        if several:
+            print_closing(console, found, [called(a) for a in found], 0)
     elif found:
         # A table is as wide as it is told to be, in a pipe too.
-        print_many(Console(width=None) if "COLUMNS" in os.environ else console, found, sort)
+        print_many(Console(width=None) if "COLUMNS" in os.environ else console, found, n_failed, sort)
 
 
 def called(a: Assessment) -> str:
@@ -63,7 +66,7 @@ def _print_one(console: Console, a: Assessment, *, several: bool) -> None:
     t = a.tracking
     which = f"{called(a)}: " if several else ""
     console.print(Text(f"{which}{_PARTS[a.part]}{a.verdict}", style="bold"))
-    console.print(Text(a.argument))
+    console.print(Text(spoken(a.argument)))
     console.print(_side_by_side(a))
     table = Table(box=None, show_header=False, pad_edge=False)
     table.add_column(style="dim", no_wrap=True)
@@ -85,7 +88,7 @@ def _print_one(console: Console, a: Assessment, *, several: bool) -> None:
         table.add_row(label, Text(value))
     console.print(table)
     for warning in a.warnings:
-        console.print(Text("warning: ", style="yellow") + Text(warning))
+        console.print(Text("warning: ", style="yellow") + Text(spoken(warning)))
     if a.outcome is not None:
         console.print(Text(a.conclusion, style=_COLOURS[a.outcome]))
     console.print()
@@ -187,10 +190,10 @@ def _index_rows(a: Assessment) -> list[tuple[str, str]]:
 
 
 def _moving_rows(a: Assessment) -> list[tuple[str, str]]:
-    if a.moving is None or a.trusted_moving is None:
+    if a.moving is None:
         return [("moving windows", a.moving_note or "")]
     rows = [("moving windows", _windows_text(a, a.moving))]
-    if a.trusted_moving is not a.moving:
+    if a.trusted_moving is not None and a.trusted_moving is not a.moving:
         rows.append(("trusted, in windows", _windows_text(a, a.trusted_moving)))
     return rows
 

@@ -44,8 +44,12 @@ def _word(text: str, expected: str) -> float:
 def _size(suffix: str, unit: str, text: str) -> float:
     """How many of the SI's unit one of the stated is."""
     wanted, expected, examples = _EXPECTED.get(unit, (unit, f"a number in {unit}", f"0.02, 0.02{unit}"))
-    if not unit and suffix in ("%", "percent"):
+    if not unit and suffix.lower() in ("%", "percent", "per cent", "pct"):
         return 0.01
+    if suffix.startswith(",") and suffix[1:2].isdigit():
+        raise argparse.ArgumentTypeError(
+            f"expected {expected} ({examples}), found '{text}': write a point for the comma"
+        )
     size = size_in_si(suffix, wanted) if wanted else None
     if size is None:
         what = measures(suffix)

@@ -118,7 +118,8 @@ def _samples(name: str, samples: ArrayLike) -> NDArray[np.float64]:
         except (TypeError, ValueError) as error:
             raise SignalError(f"{name} must be an array of numbers: {str(error).splitlines()[0]}") from None
         if array.dtype.kind not in "fiu":
-            raise SignalError(f"{name} must hold real numbers, not {array.dtype}")
+            of_channel = "; of a channel take its .values" if hasattr(samples, "values") else ""
+            raise SignalError(f"{name} must hold real numbers, not {array.dtype}{of_channel}")
         array = np.require(array, np.float64, ["C", "A"])
     if array.ndim not in (1, 2):
         raise SignalError(f"{name} must have the shape (n_samples,) or (n_samples, n_actuators), not {array.shape}")

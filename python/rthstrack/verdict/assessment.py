@@ -136,7 +136,8 @@ class Assessment(Value):
     @property
     def beside_moving(self) -> MovingTracking | None:
         """The moving windows that are drawn with the trusted ones: of the estimate asked for, or the published one."""
-        return self.published_moving if self.moving is self.trusted_moving else self.moving
+        other = self.published_moving if self.moving is self.trusted_moving else self.moving
+        return self.moving if other is None else other
 
     def _shown(self) -> Shown:
         rows = [
@@ -200,21 +201,19 @@ def assess_samples(
     of_published = published_settings(asked_for)
     published = tracking
     if settings.estimator != "fei":
-        published = Evaluator(t.size, rate_hz, of_published).evaluate(t, m, weights=True)
-        if still is not None:
-            published = _without_numbers(published, still)
+        published = _published(t, m, of_published, tracking, still)
     moving, trusted_moving, published_moving, moving_note = None, None, None, None
     try:
-        moving = _moving(t, m, rate_hz, window_s, hop_s, for_windows)
-        trusted_moving = published_moving = moving
-        if moving.settings != of_trusted:
-            trusted_moving = _moving(t, m, rate_hz, window_s, hop_s, of_trusted)
-        if settings.estimator != "fei":
-            published_moving = _moving(t, m, rate_hz, window_s, hop_s, of_published)
+        moving = trusted_moving = published_moving = _moving(t, m, rate_hz, window_s, hop_s, for_windows)
     except (SettingError, SignalError) as error:
         if asked:
             raise error.reworded(f"moving windows of {window_s:g} s: {error}") from None
-        moving, trusted_moving, published_moving, moving_note = None, None, None, failed(error)
+        moving_note = failed(error)
+    # What stands beside may fail where the judged windows do not.
+    if tracking.settings != of_trusted:
+        trusted_moving = _moving_beside(t, m, rate_hz, window_s, hop_s, of_trusted)
+    if settings.estimator != "fei":
+        published_moving = _moving_beside(t, m, rate_hz, window_s, hop_s, of_published)
     # Curves over frequency and what gain and delay depend on need every sample.
     beside = published if tracking.settings == of_trusted else tracking
     raw, without_bad = (t, m), beside
@@ -360,6 +359,35 @@ def _moving(
     settings: Settings,
 ) -> MovingTracking:
     return evaluate_moving(target, measured, rate_hz, settings, window_s=window_s, hop_s=hop_s)
+
+
+def _published(
+    target: NDArray[np.float64],
+    measured: NDArray[np.float64],
+    settings: Settings,
+    tracking: Tracking,
+    still: Said | None,
+) -> Tracking:
+    """The published average; where it is refused, as where a sum leaves the range, what is judged stands without it."""
+    try:
+        found = Evaluator(target.size, tracking.rate_hz, settings).evaluate(target, measured, weights=True)
+    except (SettingError, SignalError) as error:
+        return dataclasses.replace(_without_numbers(tracking, failed(error)), settings=settings)
+    return found if still is None else _without_numbers(found, still)
+
+
+def _moving_beside(
+    target: NDArray[np.float64],
+    measured: NDArray[np.float64],
+    rate_hz: float,
+    window_s: float,
+    hop_s: float,
+    settings: Settings,
+) -> MovingTracking | None:
+    try:
+        return _moving(target, measured, rate_hz, window_s, hop_s, settings)
+    except (SettingError, SignalError):
+        return None
 
 
 def _response(

@@ -29,6 +29,8 @@ PASSED, EXCEEDED, NOT_JUDGED = "passed", "exceeded", "not_judged"
 
 # More than this share of the windows in which target moves must be judged.
 _MOST_UNJUDGED = 0.5
+# Target moves strongly in a window from this share of the record's standard deviation on.
+_STRONG = 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,11 +46,29 @@ class Limits:
     critical_delay_s: float | None = None
     critical_fraction: float = 1.0
 
+    def __post_init__(self) -> None:
+        for name in ("delay_s", "amplitude", "critical_delay_s", "critical_fraction"):
+            value = getattr(self, name)
+            if value is None and name != "critical_fraction":
+                continue
+            is_number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+            # A loop that is unstable without any delay has a critical delay of 0.
+            if not is_number or math.isnan(value) or value < 0 or (value == 0 and name != "critical_delay_s"):
+                raise SettingError(f"limits: {name} must be a number above 0, not {value!r}")
+        if self.amplitude is not None and self.amplitude >= 1:
+            raise SettingError(
+                f"limit_amplitude: expected a share below 1 of |amplitude - 1|, found {self.amplitude:g}; 5 % is 0.05"
+            )
+        if self.critical_fraction > 1:
+            raise SettingError(
+                f"critical_fraction: expected at most 1, the critical delay itself, found {self.critical_fraction:g}"
+            )
+
     def _rows(self) -> list[_Row]:
-        rows = [(_DELAY, self.delay_s), (_AMPLITUDE, self.amplitude)]
-        if self.critical_delay_s is not None:
-            rows.append((_CRITICAL, self.critical_fraction * self.critical_delay_s))
-        return [_Row(kind, limit) for kind, limit in rows if limit is not None]
+        found = [_Row(kind, limit) for kind, limit in ((_DELAY, self.delay_s), (_AMPLITUDE, self.amplitude)) if limit]
+        if (critical := self.critical_delay_s) is not None:
+            found.append(_Row(_CRITICAL, self.critical_fraction * critical, critical))
+        return found
 
     def check(self, longest_s: float, looked_for: str) -> None:
         """Raises SettingError for a limit of the delay that no reading could exceed.
@@ -149,8 +169,11 @@ _CRITICAL = _Kind("critical_delay", "delay_s", "delay", " ms", 1e3, lambda d: d,
 
 @dataclass(frozen=True, slots=True)
 class _Row:
+    """A limit; of a critical delay the delay itself, of which the limit may be a share."""
+
     kind: _Kind
     limit: float
+    critical: float = math.nan
 
 
 def gates(
@@ -170,8 +193,8 @@ def gates(
     is a copy of target, which passes nothing; start_s: the recording's time at the first sample.
     """
     rows = limits._rows()
-    moves = None if moving is None or not rows else _moves(target, moving)
-    return tuple(_gate(row, tracking, moving, moves, trusted, copy, start_s) for row in rows)
+    motion = None if moving is None or not rows else motion_in_windows(target, moving)
+    return tuple(_gate(row, tracking, moving, motion, trusted, copy, start_s) for row in rows)
 
 
 def outcome(found: Sequence[Gate]) -> str | None:
@@ -184,13 +207,13 @@ def _gate(
     row: _Row,
     tracking: Tracking,
     moving: MovingTracking | None,
-    moves: NDArray[np.bool_] | None,
+    motion: Floats | None,
     trusted: Tracking,
     copy: Said | None,
     start_s: float,
 ) -> Gate:
     whole = _held_one(row, tracking)
-    windows = _Windows.of(row, moving, moves, start_s)
+    windows = _Windows.of(row, moving, motion, start_s)
     state, reason = _judged(row, whole, windows, tracking, trusted, copy)
     return Gate(
         name=row.kind.name,
@@ -215,10 +238,10 @@ def _judged(
     if copy is not None:
         return NOT_JUDGED, Said(f"no limit is passed: {copy.cause}", "limit_copy")
     asked = f"the limit of {row.kind.text(limit)}"
-    found = f"{row.kind.called} {_told(row, whole)}"
+    found = f"{row.kind.called} {_told(row, whole)}{_share(row, whole)}"
     code = f"limit_{name}"
     if windows.state == EXCEEDED and worst is not None and (whole.state != EXCEEDED or worst.value > whole.value):
-        words = f"{row.kind.called} {_told(row, worst)} in the {windows.where} exceeds {asked} ({_spans(windows)})"
+        words = f"{row.kind.called} {_told(row, worst)}{_share(row, worst)} in the {windows.where} exceeds {asked} ({_spans(windows)})"
         return EXCEEDED, Said(words, code, (worst.value, limit))
     if whole.state == EXCEEDED:
         return EXCEEDED, Said(f"{found} exceeds {asked}", code, (whole.value, limit))
@@ -227,16 +250,22 @@ def _judged(
     if (why := _undetermined(trusted)) is not None:
         words = f"{found} is the published average; the trusted estimate is not determined: {why}"
         return NOT_JUDGED, Said(words, "limit_undetermined")
-    if tracking is not trusted and _held_one(row, trusted).state != PASSED:
-        words = f"{found} is within {asked}, but the trusted estimate, {_told(row, _held_one(row, trusted))}, is not"
-        return NOT_JUDGED, Said(words, "limit_not_trusted")
     if whole.state == NOT_JUDGED:
         return NOT_JUDGED, Said(
             f"{found} may be within or beyond {asked}: its interval contains the limit",
             "limit_straddled",
             (whole.low, whole.high),
         )
+    if tracking is not trusted and _held_one(row, trusted).state != PASSED:
+        words = f"{found} is within {asked}, but the trusted estimate, {_told(row, _held_one(row, trusted))}, is not"
+        return NOT_JUDGED, Said(words, "limit_not_trusted")
+    if windows.unknown is not None:
+        first, last, cause = windows.unknown
+        words = f"from {first:.4g} to {last:.4g} s, where target moves, nothing is known: {cause}"
+        return NOT_JUDGED, Said(words, "limit_stretch", (first, last))
     if windows.state == NOT_JUDGED:
+        if not windows.n_moving:
+            return NOT_JUDGED, Said("no moving window could be judged", "limit_windows", (0, 0))
         if worst is not None and windows.n_undetermined <= _MOST_UNJUDGED * windows.n_moving:
             words = (
                 f"{row.kind.called} {_told(row, worst)} in the {windows.where} may be within or beyond {asked}: "
@@ -282,6 +311,7 @@ class _Windows:
     n_moving: int = 0
     n_undetermined: int = 0
     over_s: tuple[tuple[float, float], ...] = ()
+    unknown: tuple[float, float, str] | None = None
 
     @property
     def where(self) -> str:
@@ -289,19 +319,18 @@ class _Windows:
         return f"{self.window_s:.3g} s around {self.worst_s:.4g} s"
 
     @classmethod
-    def of(cls, row: _Row, moving: MovingTracking | None, moves: NDArray[np.bool_] | None, start_s: float) -> _Windows:
-        if moving is None or moves is None:
-            return cls(PASSED)
+    def of(cls, row: _Row, moving: MovingTracking | None, motion: Floats | None, start_s: float) -> _Windows:
+        if moving is None or motion is None:
+            return cls(NOT_JUDGED)
+        moves, strongly = motion >= moving.minimum_std_ratio, motion >= _STRONG
         name = row.kind.of
         intervals: Floats = moving.delay_interval_s if name == "delay_s" else moving.amplitude_interval
         held = [
             _held(row, float(value), float(low), float(high))
             for value, (low, high) in zip(getattr(moving, name), intervals, strict=True)
         ]
-        # An interval wider than the limit itself to either side says nothing of it.
-        says = np.array(
-            [not math.isnan(one.value) and not one.high - one.low > 2 * row.limit for one in held], dtype=bool
-        )
+        # An interval wider than the limit, or with the limit in it where target moves but little, says nothing of it.
+        says = np.array([_says(one, row.limit, bool(strong)) for one, strong in zip(held, strongly, strict=True)])
         n_moving = int(moves.sum())
         n_undetermined = int((moves & ~says).sum())
         times = start_s + moving.time_s
@@ -318,19 +347,51 @@ class _Windows:
         if state != EXCEEDED and n_undetermined > _MOST_UNJUDGED * n_moving:
             state = NOT_JUDGED
         return cls(
-            state, held[worst], float(times[worst]), moving.window_s, n_moving, n_undetermined, _runs(times, over)
+            state,
+            held[worst],
+            float(times[worst]),
+            moving.window_s,
+            n_moving,
+            n_undetermined,
+            _runs(times, over),
+            _unknown(moving, np.array([math.isnan(one.value) for one in held]), strongly, start_s),
         )
 
 
-def _moves(target: Floats, moving: MovingTracking) -> NDArray[np.bool_]:
-    """In which windows target moves, whatever measured does."""
+def _says(held: Held, limit: float, strongly: bool) -> bool:
+    """Whether a window's number says something of the limit."""
+    if math.isnan(held.value) or held.state == EXCEEDED:
+        return held.state == EXCEEDED
+    if held.high - held.low > limit:
+        return False
+    return strongly or held.state == PASSED or held.value > limit
+
+
+def _unknown(
+    moving: MovingTracking, undetermined: NDArray[np.bool_], strongly: NDArray[np.bool_], start_s: float
+) -> tuple[float, float, str] | None:
+    """The longest stretch, of a window at least, in which target moves strongly and no window has a number; and why."""
+    missing = undetermined & strongly
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], missing, [False])).astype(np.int8)))
+    runs = [(int(b - a), int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    _, first, end = max(runs, default=(0, 0, 0))
+    if (end - first) * moving.hop_s < moving.window_s:
+        return None
+    why = str(moving.reason[(first + end) // 2]).partition(": ")[2] or "measured does not move"
+    return start_s + float(moving.time_s[first]), start_s + float(moving.time_s[end - 1]), why
+
+
+def motion_in_windows(target: Floats, moving: MovingTracking) -> Floats:
+    """Target's standard deviation in each window over that of the record, whatever measured does."""
     n = round(moving.window_s * moving.rate_hz)
     starts = np.rint(moving.time_s * moving.rate_hz - (n - 1) / 2).astype(np.intp)
     centred = target - target.mean()
     sums, squares = (np.concatenate(([0.0], np.cumsum(column))) for column in (centred, centred**2))
     mean = (sums[starts + n] - sums[starts]) / n
     variance = (squares[starts + n] - squares[starts]) / n - mean**2
-    return np.sqrt(np.maximum(variance, 0.0)) >= moving.minimum_std_ratio * float(target.std())
+    spread = float(target.std())
+    moves: Floats = np.sqrt(np.maximum(variance, 0.0)) / spread if spread > 0 else np.zeros(starts.size)
+    return moves
 
 
 def _runs(times: Floats, over: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
@@ -340,7 +401,10 @@ def _runs(times: Floats, over: NDArray[np.bool_]) -> tuple[tuple[float, float], 
 
 
 def _missing(windows: _Windows) -> str:
-    return f"{windows.n_undetermined} of the {windows.n_moving} windows in which target moves have no number"
+    return (
+        f"{windows.n_undetermined} of the {windows.n_moving} windows in which target moves have no number, or too wide "
+        "an interval"
+    )
 
 
 def _spans(windows: _Windows) -> str:
@@ -349,6 +413,13 @@ def _spans(windows: _Windows) -> str:
     first, last = spans[0]
     one = f"from {first:.4g} to {last:.4g} s" if first != last else f"at {first:.4g} s"
     return f"exceeded {one}" if len(spans) == 1 else f"exceeded {len(spans)} times, first {one}"
+
+
+def _share(row: _Row, held: Held) -> str:
+    """A lag as a share of the critical delay."""
+    if not (math.isfinite(row.critical) and row.critical > 0 and held.value > 0):
+        return ""
+    return f", {100 * held.value / row.critical:.3g} % of the critical {row.kind.text(row.critical)},"
 
 
 def _told(row: _Row, held: Held) -> str:
@@ -363,7 +434,8 @@ def _told(row: _Row, held: Held) -> str:
     return f"{value}{row.kind.unit} ({low} to {high})"
 
 
-_CONCLUSIONS = {PASSED: "PASS", EXCEEDED: "FAIL", NOT_JUDGED: "CANNOT BE JUDGED"}
+CANNOT_BE_JUDGED = "CANNOT BE JUDGED"
+_CONCLUSIONS = {PASSED: "PASS", EXCEEDED: "FAIL", NOT_JUDGED: CANNOT_BE_JUDGED}
 
 
 def conclusion(found: Sequence[Gate]) -> str:

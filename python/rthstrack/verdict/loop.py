@@ -52,8 +52,8 @@ class LoopEffect:
         else:
             share = _percent(self.share, self.share_interval)
             near = f"the delay is {share} of the critical {1e3 * self.critical_delay_s:.4g} ms"
-        if not self.share > 0 and not self.damping_lost > 0:
-            return f"{near}; a lead takes away no damping"
+        if not self.share > 0:
+            return "measured does not lag: it comes no nearer to the critical delay and takes no damping away"
         without = 100 * self.damping_ratio_without
         lost = _percent(self.damping_lost, self.damping_lost_interval)
         said = f"{near} and takes away {lost} of critical damping; the structure has {without:.3g} % at "

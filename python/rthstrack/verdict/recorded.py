@@ -5,11 +5,13 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack, overload
 
-from rthstrack.errors import ChannelError, SettingError, SignalError
+from rthstrack.errors import ChannelError, SettingError, SignalError, UnknownSettingError
+from rthstrack.keyed_table import suggestion
 from rthstrack.recording.chosen import choose
 from rthstrack.recording.recording import Recording
 from rthstrack.said import Said, coded
 from rthstrack.verdict.assessment import assess_samples
+from rthstrack.verdict.limits import Limits
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -18,7 +20,6 @@ if TYPE_CHECKING:
 
     from rthstrack.evaluation.settings import Settings
     from rthstrack.verdict.assessment import Assessment
-    from rthstrack.verdict.limits import Limits
     from rthstrack.virtual_test.parts import VirtualTest
 
 
@@ -80,6 +81,15 @@ def assess(  # type: ignore[misc]  # the target may be given by its name too
     evaluation or the frequency response is impossible, it is None and its note says why, unless `moving_s` or `hop_s`
     asked for it.
     """
+    known = OfSamples.__annotations__ | Judging.__annotations__
+    if unknown := [name for name in how if name not in known]:
+        near = suggestion(unknown[0], known)
+        raise UnknownSettingError(
+            f"assess has no argument {unknown[0]!r}{near}; how the pair is evaluated stands in settings=Settings(...), "
+            "what is allowed in limits=Limits(...)"
+        )
+    if not isinstance(how.get("limits"), Limits | None):
+        raise SettingError(f"limits: expected Limits(...), found {how['limits']!r}")
     if isinstance(recording, Recording):
         if rate_hz is not None:
             raise SettingError("rate_hz: a recording has its own; give it to read_recording")

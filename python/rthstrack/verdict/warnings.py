@@ -12,6 +12,7 @@ from rthstrack.recording.copies import is_copy
 from rthstrack.said import Said
 from rthstrack.units import length_factor
 from rthstrack.verdict.difference import _SAME_DELAY_S
+from rthstrack.verdict.limits import motion_in_windows
 from rthstrack.verdict.sentence import _percent, _undetermined
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ def warnings(
         _coherence(tracking, response, names),
         _delay_spread(tracking, trusted, response) if _by_frequency(depends) else None,
         _levels(target, names[0]),
-        _quiet(moving, names[0]),
+        _quiet(target, moving, names[0]),
     )
     return {warning.code: warning for warning in found if warning is not None}
 
@@ -361,10 +362,10 @@ def _levels(target: NDArray[np.float64], name: str) -> Said | None:
     return Said(words, "few_levels", [n])
 
 
-def _quiet(moving: MovingTracking | None, name: str) -> Said | None:
+def _quiet(target: NDArray[np.float64], moving: MovingTracking | None, name: str) -> Said | None:
     if moving is None or moving.valid.size == 0:
         return None
-    share = float(np.mean([code == "still" for code in moving.reason_code]))
+    share = float(np.mean(motion_in_windows(target, moving) < moving.minimum_std_ratio))
     if share < 0.5:
         return None
     return Said(

@@ -225,7 +225,7 @@ def _format(file: Path) -> Format:
     if not file.exists():
         raise RecordingError("no such file")
     if file.is_dir():
-        raise RecordingError("a directory; expected a file")
+        raise RecordingError("a folder without recordings of its own; expected a file, or a folder with files in it")
     if not file.is_file():
         raise RecordingError("not a regular file")
     with file.open("rb") as opened:
