@@ -181,7 +181,7 @@ def test_strangers_get_no_number(seed: int) -> None:
         (other(seed), "follows target"),
         (motion(t - 3.0), "follows target"),
         (motion(t - 0.6), "beyond max_delay_s"),
-        (-0.9 * motion(t - DELAY_S), "moves against target, with a lag of about"),
+        (-0.9 * motion(t - DELAY_S), "with its sign reversed it would lag by about"),
     ):
         found = rthstrack.evaluate(motion(t), measured, RATE_HZ, **TRUSTED)
         assert np.isnan(found.delay_s), said
