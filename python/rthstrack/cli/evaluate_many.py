@@ -64,11 +64,12 @@ def _largest(a: Assessment) -> float:
     return math.nan if a.moving is None or not a.moving.valid.any() else float(np.nanmax(np.abs(a.moving.delay_s)))
 
 
+_WORST_WINDOW = _Column("worst window", 2, lambda a: _known(1e3 * _largest(a), ".3f"))
 _COLUMNS = (
     _Column("amplitude", 0, lambda a: _amplitude(a.tracking)),
     _Column("delay ms", 0, lambda a: _delay(a.tracking)),
     _Column("95 % interval", 1, lambda a: _delay_interval(a.tracking)),
-    _Column("worst window", 2, lambda a: _known(1e3 * _largest(a), ".3f")),
+    _WORST_WINDOW,
     _Column("rms error %", 0, lambda a: f"{a.indices.rms_error_percent:.3g}"),
     _Column("at Hz", 4, lambda a: _known(float(a.tracking.equivalent_frequency_hz), ".3g")),
     _Column("target, measured", 5, lambda a: f"{a.target_name}, {a.measured_name}"),
@@ -88,7 +89,7 @@ def print_many(console: Console, assessments: Sequence[Assessment], n_failed: in
         columns.append(_Column("", 0, lambda a: _OUTCOMES[a.outcome]))
     if any(gate.state == "exceeded" != gate.whole.state for a in found for gate in a.gates):
         # What failed by a window alone is not understood without it.
-        columns = [dataclasses.replace(c, rank=0) if c.name == "worst window" else c for c in columns]
+        columns = [dataclasses.replace(c, rank=0) if c is _WORST_WINDOW else c for c in columns]
     cells = {column: [column.text(a) for a in found] for column in columns}
     widths = {column: max(len(column.name), *map(len, cells[column])) for column in columns}
     longest = max(map(len, (*names, "file")))

@@ -16,10 +16,11 @@ _EXPECTED = {
     "m": ("length", "a length", "0.005, 5mm"),
     "": ("", "a number", "0.05, '5 %'"),
 }
+_PERCENT = frozenset(("%", "percent", "per cent", "pct"))
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*", re.DOTALL)
 
 
-def number(text: str, unit: str = "", expected: str = "a finite number") -> float:
+def number(text: str, unit: str = "", expected: str = "a number") -> float:
     """The number in SI, checked to be finite; `unit` is the SI's unit of what is expected, "" for a bare number.
 
     expected: what it is, in words, for what is no number.
@@ -28,7 +29,7 @@ def number(text: str, unit: str = "", expected: str = "a finite number") -> floa
     size = _size(found[2], unit, text) if found and found[2] else 1.0
     value = size * (float(found[1]) if found else _word(text, expected))
     if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"expected {expected}, found '{text}'")
+        raise argparse.ArgumentTypeError(f"expected {expected} that is finite, found '{text}'")
     return value
 
 
@@ -37,14 +38,13 @@ def _word(text: str, expected: str) -> float:
     try:
         return float(text)
     except ValueError:
-        expected = expected.replace("a finite number", "a number")
         raise argparse.ArgumentTypeError(f"expected {expected}, found '{text}'") from None
 
 
 def _size(suffix: str, unit: str, text: str) -> float:
     """How many of the SI's unit one of the stated is."""
     wanted, expected, examples = _EXPECTED.get(unit, (unit, f"a number in {unit}", f"0.02, 0.02{unit}"))
-    if not unit and suffix.lower() in ("%", "percent", "per cent", "pct"):
+    if not unit and suffix.lower() in _PERCENT:
         return 0.01
     if suffix.startswith(",") and suffix[1:2].isdigit():
         raise argparse.ArgumentTypeError(

@@ -241,7 +241,8 @@ def _judged(
     found = f"{row.kind.called} {_told(row, whole)}{_share(row, whole)}"
     code = f"limit_{name}"
     if windows.state == EXCEEDED and worst is not None and (whole.state != EXCEEDED or worst.value > whole.value):
-        words = f"{row.kind.called} {_told(row, worst)}{_share(row, worst)} in the {windows.where} exceeds {asked} ({_spans(windows)})"
+        words = f"{row.kind.called} {_told(row, worst)}{_share(row, worst)} in the {windows.where}"
+        words += f" exceeds {asked} ({_spans(windows)})"
         return EXCEEDED, Said(words, code, (worst.value, limit))
     if whole.state == EXCEEDED:
         return EXCEEDED, Said(f"{found} exceeds {asked}", code, (whole.value, limit))
