@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from rthstrack.cli.arguments import add_method, add_signals, chosen, files_in, path, told, tolerance
 from rthstrack.cli.commands import COMMANDS
 from rthstrack.cli.evaluate_tables import write_tables
-from rthstrack.cli.evaluate_text import SORTED_BY, print_text
+from rthstrack.cli.evaluate_text import print_text
 from rthstrack.cli.progress import counted
 from rthstrack.cli.quantities import positive, seconds
 from rthstrack.cli.setting_options import FACTORS, setting_options, settle, with_auto
@@ -29,6 +29,7 @@ from rthstrack.verdict.assessment import Assessment, assess, trusted_settings, w
 from rthstrack.verdict.entry import result_entry
 from rthstrack.verdict.limits import EXCEEDED as LIMIT_EXCEEDED
 from rthstrack.verdict.limits import NOT_JUDGED, Limits
+from rthstrack.verdict.order import SORTED_BY
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence

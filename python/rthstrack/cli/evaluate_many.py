@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from rthstrack.said import coded
 from rthstrack.verdict.display import with_interval
+from rthstrack.verdict.order import WORST, in_order
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
 _OUTCOMES = {None: "", "passed": "pass", "exceeded": "FAIL", "not_judged": "not judged"}
 _STYLES = {None: "", "passed": "green", "exceeded": "bold red", "not_judged": "bold yellow"}
-_WORST = ("exceeded", "not_judged")
 # A name is cut to no less than this.
 _SHORTEST_NAME = 16
 # So many files are named beside a remark.
@@ -79,7 +79,7 @@ def print_many(console: Console, assessments: Sequence[Assessment], sort: str) -
     """Prints the table, then what is odd, each kind once, and one closing line where limits were given."""
     from rich.text import Text
 
-    found = _sorted(assessments, sort)
+    found = in_order(assessments, sort)
     names = _names(found)
     columns = [column for column in _COLUMNS if any(column.text(a) != "-" for a in found)]
     if any(a.outcome for a in found):
@@ -104,26 +104,6 @@ def print_many(console: Console, assessments: Sequence[Assessment], sort: str) -
     _print_remarks(console, found, names)
     if (closing := _closing(found, names)) is not None:
         console.print(Text(closing[0], style=_STYLES[closing[1]]))
-
-
-def _sorted(assessments: Sequence[Assessment], sort: str) -> list[Assessment]:
-    def downwards(value: float) -> float:
-        return -math.inf if math.isnan(value) else -value
-
-    def place(a: Assessment) -> tuple[float | str, ...]:
-        error, delay = downwards(a.indices.rms_error_percent), downwards(abs(float(a.tracking.delay_s)))
-        if sort == "file":
-            return (a.file, a.actuator)
-        if sort == "delay":
-            return (delay,)
-        if sort == "amplitude":
-            return (downwards(abs(float(a.tracking.amplitude) - 1)),)
-        if sort == "error":
-            return (error,)
-        rank = _WORST.index(a.outcome) if a.outcome in _WORST else len(_WORST)
-        return (rank, error)
-
-    return list(assessments) if sort == "given" else sorted(assessments, key=place)
 
 
 def _names(assessments: Sequence[Assessment]) -> list[str]:
@@ -174,10 +154,10 @@ def _closing(found: Sequence[Assessment], names: Sequence[str]) -> tuple[str, st
     counted = Counter(a.outcome for a in found if a.outcome is not None)
     if not counted:
         return None
-    state = next(one for one in (*_WORST, "passed") if counted[one])
+    state = next(one for one in (*WORST, "passed") if counted[one])
     n = sum(counted.values())
     worst, name = next((a, name) for a, name in zip(found, names, strict=True) if a.outcome == state)
     words = {"exceeded": "exceed a limit", "not_judged": "cannot be judged", "passed": "are within the limits"}
-    parts = [f"{counted[one]} of {n} {words[one]}" for one in (*_WORST, "passed") if counted[one]]
+    parts = [f"{counted[one]} of {n} {words[one]}" for one in (*WORST, "passed") if counted[one]]
     heading = worst.conclusion.partition(": ")[0]
     return f"{heading}: {', '.join(parts)}; {name}: {worst.conclusion.partition(': ')[2]}", state
