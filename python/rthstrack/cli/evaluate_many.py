@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rthstrack.said import coded
-from rthstrack.verdict.display import with_interval
+from rthstrack.verdict.display import shortened, with_interval
 from rthstrack.verdict.order import WORST, in_order
 
 if TYPE_CHECKING:
@@ -55,18 +55,11 @@ def _delay_interval(t: Tracking) -> str:
     return rest.removesuffix(")") if opened else "-"
 
 
-def _largest(a: Assessment) -> float:
-    """The largest |delay| of the windows, s."""
-    import numpy as np
-
-    return math.nan if a.moving is None or not a.moving.valid.any() else float(np.nanmax(np.abs(a.moving.delay_s)))
-
-
 _COLUMNS = (
     _Column("amplitude", 0, lambda a: _amplitude(a.tracking)),
     _Column("delay ms", 0, lambda a: _delay(a.tracking)),
     _Column("95 % interval", 1, lambda a: _delay_interval(a.tracking)),
-    _Column("worst window", 2, lambda a: _known(1e3 * _largest(a), ".3f")),
+    _Column("worst window", 2, lambda a: _known(1e3 * a.largest_delay_s, ".3f")),
     _Column("rms error %", 0, lambda a: f"{a.indices.rms_error_percent:.3g}"),
     _Column("at Hz", 4, lambda a: _known(float(a.tracking.equivalent_frequency_hz), ".3g")),
     _Column("target, measured", 5, lambda a: f"{a.target_name}, {a.measured_name}"),
@@ -99,7 +92,7 @@ def print_many(console: Console, assessments: Sequence[Assessment], sort: str) -
     head = "  ".join([f"{'file':<{room}}", *(f"{column.name:>{widths[column]}}" for column in columns)])
     console.print(Text(head.rstrip(), style="bold"), no_wrap=True)
     for i, (a, name) in enumerate(zip(found, names, strict=True)):
-        line = [f"{_cut(name, room):<{room}}", *(f"{cells[column][i]:>{widths[column]}}" for column in columns)]
+        line = [f"{shortened(name, room):<{room}}", *(f"{cells[column][i]:>{widths[column]}}" for column in columns)]
         console.print(Text("  ".join(line).rstrip(), style=_STYLES[a.outcome]), no_wrap=True)
     _print_remarks(console, found, names)
     if (closing := _closing(found, names)) is not None:
@@ -125,14 +118,6 @@ def _names(assessments: Sequence[Assessment]) -> list[str]:
 def _alike(files: Sequence[str]) -> bool:
     """Whether they can have a folder in common: all from the root, or none."""
     return len({os.path.isabs(file) for file in files}) == 1
-
-
-def _cut(name: str, width: int) -> str:
-    """A name cut in the middle, so that its beginning and its end are seen."""
-    if len(name) <= width:
-        return name
-    first = (width - 3) // 2
-    return f"{name[:first]}...{name[len(name) - (width - 3 - first) :]}"
 
 
 def _print_remarks(console: Console, found: Sequence[Assessment], names: Sequence[str]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -29,7 +30,7 @@ _PART, _SURE = 0.1, 2.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Band:
-    """Gain, delay and coherence of half an octave over time, arrays (n_windows,): means over its bins, by target's energy.
+    """Gain, delay and coherence of half an octave over time, (n_windows,): means over its bins by target's energy.
 
     time_s: the windows' centres, from the first sample; `half_width_*`: of 95 % intervals, NaN where there are none.
     """
@@ -59,7 +60,7 @@ class TimeFrequency:
 
     @property
     def changes_with_both(self) -> tuple[str, ...]:
-        """Which of "gain" and "delay_s" change over time within a band and from band to band, beyond their intervals."""
+        """Which of "gain" and "delay_s" change over time within a band, and from band to band, by more than noise."""
         return tuple(name for name in _LEAST if self._changes(name))
 
     def _changes(self, name: str) -> bool:
@@ -78,7 +79,8 @@ class TimeFrequency:
             for values, half in found
         ]
         over_time = any(np.mean(one) > _PART for one in away)
-        return over_time and max(means) - min(means) > max(least, *(float(np.nan_to_num(half).mean()) for _, half in found))
+        widest = max(float(np.nan_to_num(half).mean()) for _, half in found)
+        return over_time and max(means) - min(means) > max(least, widest)
 
 
 def time_frequency(
@@ -103,7 +105,7 @@ def time_frequency(
     edges = [high * 2.0**-k for k in range(n_bands, -1, -1)]
     bands = [
         band
-        for one, next_one in zip(edges[:-1], edges[1:], strict=True)
+        for one, next_one in pairwise(edges)
         for band in _octave(target, measured, rate_hz, one, next_one, align_s, dispersion)
     ]
     return TimeFrequency(tuple(bands), least_coherence) if len(bands) > 1 else None

@@ -140,6 +140,21 @@ class Assessment:
         """The moving windows that are drawn with the trusted ones: of the estimate asked for, or the published one."""
         return self.published_moving if self.moving is self.trusted_moving else self.moving
 
+    @property
+    def largest_delay_s(self) -> float:
+        """The largest |delay| of the moving windows."""
+        moving = self.moving
+        return math.nan if moving is None or not moving.valid.any() else float(abs(moving.delay_s[moving.valid]).max())
+
+    def over_limit_s(self) -> dict[str, list[tuple[float, float]]]:
+        """From when to when windows exceed a limit of "amplitude" or of "delay", each window as wide as one hop."""
+        half = 0.0 if self.moving is None else self.moving.hop_s / 2
+        over: dict[str, list[tuple[float, float]]] = {"amplitude": [], "delay": []}
+        for gate in self.gates:
+            spans = over["amplitude" if gate.name == "amplitude" else "delay"]
+            spans += [(first - half, last + half) for first, last in gate.over_s]
+        return over
+
     def time_frequency(self) -> TimeFrequency | None:
         """Gain and delay over time and frequency, computed at each call; None where they do not change with both."""
         d = self.dependence

@@ -98,6 +98,14 @@ def with_interval(value: float, interval: Sequence[float], unit: str = "") -> st
     return f"{value:.{places}f}{tail} ({low:.{places}f} to {high:.{places}f})"
 
 
+def shortened(name: str, width: int) -> str:
+    """A name cut in the middle, so that its beginning and its end are seen."""
+    if len(name) <= width:
+        return name
+    first = (width - 3) // 2
+    return f"{name[:first]}...{name[len(name) - (width - 3 - first) :]}"
+
+
 def reasons(moving: MovingTracking) -> list[tuple[int, str]]:
     """Why windows have no number or no interval: how many of each kind, most frequent first, and the first's words."""
     kinds: dict[Any, tuple[int, str]] = {}
