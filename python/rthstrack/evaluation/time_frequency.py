@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 _PERIODS, _SEGMENTS, _READINGS = 4.0, 4.0, 8.0
 # Longer windows than this share of the record tell nothing over time; more readings than this nobody sees.
 _LONGEST, _MOST_READINGS = 0.4, 150
+# Samples a second by the highest frequency.
+_OVERSAMPLING = 16.0
 # Changes below these shares of gain and delay are no finding, nor are those of fewer readings.
 _LEAST = {"gain": 0.03, "delay_s": 0.07}
 _FEWEST = 4
@@ -102,6 +104,9 @@ def time_frequency(
     n_bands = math.floor(math.log2(high / low) + 0.3) if high > low else 0
     if n_bands < 2:
         return None
+    # All that is looked at lies below `high`: at a lower rate it costs little.
+    n = min(target.size, math.ceil(target.size * _OVERSAMPLING * high / rate_hz))
+    target, measured, rate_hz = _slower(target, n), _slower(measured, n), rate_hz * n / target.size
     edges = [high * 2.0**-k for k in range(n_bands, -1, -1)]
     bands = [
         band
@@ -109,6 +114,16 @@ def time_frequency(
         for band in _octave(target, measured, rate_hz, one, next_one, align_s, dispersion)
     ]
     return TimeFrequency(tuple(bands), least_coherence) if len(bands) > 1 else None
+
+
+def _slower(signal: Floats, n: int) -> Floats:
+    """The same motion by n samples, below half their rate; mirrored at its ends, so that there is no step."""
+    if n >= signal.size:
+        return signal
+    spectrum = np.fft.rfft(np.concatenate((signal, signal[::-1])))[: n + 1]
+    spectrum[n] = 0
+    slower: Floats = np.fft.irfft(spectrum, 2 * n)[:n] * (n / signal.size)
+    return slower
 
 
 def _octave(

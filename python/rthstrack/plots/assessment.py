@@ -8,20 +8,15 @@ window opens. Colours are Okabe and Ito's, as on the report's page.
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import matplotlib
-import matplotlib.font_manager
-import matplotlib.ticker
+import matplotlib.cm
+import matplotlib.colors
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from rthstrack.errors import SettingError
 from rthstrack.plots.style import (
     BAND,
-    DOUBLE_COLUMN_IN,
     DOUBTFUL,
     ERROR,
     LIMIT,
@@ -35,6 +30,9 @@ from rthstrack.plots.style import (
     _legend,
     _several,
     _style,
+    drawn,
+    even_ticks,
+    log_ticks,
     shared_label,
     value_range,
 )
@@ -51,8 +49,6 @@ if TYPE_CHECKING:
     from rthstrack.evaluation.response import FrequencyResponse, FrequencySlopes
     from rthstrack.evaluation.tracking import MovingTracking
 
-_FORMATS = ("png", "pdf", "svg")
-
 
 def plot_time_history(
     assessment: Assessment, *, ax: Axes | None = None, span_s: tuple[float, float] | None = None
@@ -62,8 +58,10 @@ def plot_time_history(
         ax = _axes(ax, 1.8)
         target_role, measured_role = display.signal_roles(assessment.part)
         time_s, part = _span(assessment, span_s)
-        ax.plot(time_s, assessment.target[part], color=TARGET, label=target_role)
-        ax.plot(time_s, assessment.measured[part], color=MEASURED, label=measured_role, linewidth=0.7)
+        target, measured = assessment.target[part], assessment.measured[part]
+        kept = drawn(target, measured)
+        ax.plot(time_s[kept], target[kept], color=TARGET, label=target_role)
+        ax.plot(time_s[kept], measured[kept], color=MEASURED, label=measured_role, linewidth=0.7)
         ax.set_ylabel(_label(display.quantity(assessment.unit), assessment.unit))
         _time_axis(ax, time_s)
         _legend(ax, columns=2)
@@ -77,12 +75,9 @@ def plot_error(assessment: Assessment, *, ax: Axes | None = None, span_s: tuple[
         target_role, measured_role = display.signal_roles(assessment.part)
         time_s, part = _span(assessment, span_s)
         ax.axhline(0, color=MUTED, linewidth=0.5)
-        ax.plot(
-            time_s,
-            assessment.measured[part] - assessment.target[part],
-            color=ERROR,
-            label=f"{measured_role} \N{MINUS SIGN} {target_role}",
-        )
+        error = assessment.measured[part] - assessment.target[part]
+        kept = drawn(error)
+        ax.plot(time_s[kept], error[kept], color=ERROR, label=f"{measured_role} \N{MINUS SIGN} {target_role}")
         ax.set_ylabel(_label("Error", assessment.unit))
         _time_axis(ax, time_s)
         _legend(ax)
@@ -103,7 +98,8 @@ def plot_loop(assessment: Assessment, *, ax: Axes | None = None, span_s: tuple[f
         ax.set_aspect("equal", adjustable="box")
         ax.set_xlabel(_label(target_role.capitalize(), assessment.unit))
         ax.set_ylabel(_label(measured_role.capitalize(), assessment.unit))
-        _few_ticks(ax)
+        even_ticks(ax, "x")
+        even_ticks(ax, "y")
     return ax
 
 
@@ -130,7 +126,7 @@ def plot_spectra(assessment: Assessment, *, ax: Axes | None = None) -> Axes:
         weight_axis = ax.twinx()
         weight_axis.fill_between(frequency, weights, color=SECOND, alpha=0.3, linewidth=0)
         weight_axis.set_ylim(0, 1.15 * float(weights[inside].max(initial=0.0)) or 1.0)
-        weight_axis.set_ylabel("Weight of a bin (-)", color=SECOND)
+        weight_axis.set_ylabel("Weight (-)", color=SECOND)
         weight_axis.tick_params(axis="y", colors=SECOND)
         weight_axis.spines["right"].set_visible(True)
         weight_axis.spines["right"].set_color(SECOND)
@@ -144,6 +140,8 @@ def plot_spectra(assessment: Assessment, *, ax: Axes | None = None) -> Axes:
         low = min(target[inside].min(initial=peak), measured[inside].min(initial=peak))
         if peak > 0:
             ax.set_ylim(max(low, 1e-6 * peak) / 1.5, peak * 4)
+        log_ticks(ax, "y")
+        even_ticks(weight_axis, "y")
         _mark_equivalent_frequency(ax, assessment)
         ax.set_ylabel(_label("Fourier amplitude", f"{assessment.unit} s" if assessment.unit else None))
         _legend(ax, columns=2)
@@ -197,8 +195,9 @@ def plot_frequency_response(
         delay_axis.set_ylabel("Delay (ms)")
         for axis in ax:
             _frequency_axis(axis, low, high)
+            even_ticks(axis, "y")
             if isinstance(result, Assessment):
-                _mark_equivalent_frequency(axis, result, labelled=axis is gain_axis)
+                _mark_equivalent_frequency(axis, result, labelled=False)
         shared_label(ax, "Frequency (Hz)")
     return ax
 
@@ -209,7 +208,7 @@ def plot_moving(
     """A(t) and d(t) (ms) of moving windows, at their centres, on two axes; gaps where nothing could be determined.
 
     An assessment gives the trusted estimate with its 95 % intervals as a band beside the published or the one asked
-    for, its limits (dashed) and the whole record's trusted A and d (dotted).
+    for, its limits (dashed), when they were exceeded (shaded) and the whole record's trusted A and d (dotted).
     """
     with _style():
         ax = _several(ax, 2, 2.8)
@@ -252,6 +251,10 @@ def plot_moving(
             amplitude_axis.axhline(float(whole.amplitude), **dotted)
             delay_axis.axhline(float(whole.delay_s) * 1e3, **dotted)
             _limit_lines(amplitude_axis, delay_axis, assessment.limits)
+            over = assessment.over_limit_s()
+            for axis, name in ((amplitude_axis, "amplitude"), (delay_axis, "delay")):
+                for first, last in over[name]:
+                    axis.axvspan(first, last, color=LIMIT, alpha=0.15, linewidth=0)
         amplitude_axis.set_ylabel("A (-)")
         delay_axis.set_ylabel("d (ms)")
         for axis in ax:
@@ -259,6 +262,8 @@ def plot_moving(
                 axis.set_xlim(assessment.start_s, assessment.start_s + assessment.target.size / assessment.rate_hz)
             elif time_s.size > 1:
                 axis.set_xlim(time_s[0], time_s[-1])
+            even_ticks(axis, "x")
+            even_ticks(axis, "y")
         shared_label(ax, "Time (s)")
     return ax
 
@@ -272,13 +277,14 @@ def plot_indices(
         error_axis, indicator_axis = ax
         h = assessment.histories
         time_s = assessment.start_s + np.arange(h.rms_error.size) / h.rate_hz
-        error_axis.plot(time_s, h.max_tracking_error, color=ERROR, label="MTE")
-        error_axis.plot(time_s, h.rms_error, color=THIRD, label="RMS")
+        kept = drawn(h.max_tracking_error, h.rms_error, h.tracking_indicator)
+        error_axis.plot(time_s[kept], h.max_tracking_error[kept], color=ERROR, label="MTE")
+        error_axis.plot(time_s[kept], h.rms_error[kept], color=THIRD, label="RMS")
         error_axis.set_ylim(bottom=0)
         error_axis.set_ylabel(_label("Error so far", assessment.unit))
         _legend(error_axis, columns=2)
         indicator_axis.axhline(0, color=MUTED, linewidth=0.5)
-        indicator_axis.plot(time_s, h.tracking_indicator, color=SECOND)
+        indicator_axis.plot(time_s[kept], h.tracking_indicator[kept], color=SECOND)
         indicator_axis.set_ylabel(_label("TI", f"{assessment.unit}²" if assessment.unit else None))
         for axis in ax:
             _time_axis(axis, time_s)
@@ -286,49 +292,46 @@ def plot_indices(
     return ax
 
 
-def figure(assessment: Assessment) -> Figure:
-    """One figure, two columns wide: histories, their strongest 4 s, loop, spectra, A and d over time and frequency."""
-    with _style():
-        page = Figure(figsize=(DOUBLE_COLUMN_IN, 8.2), layout=ConstrainedLayoutEngine(w_pad=0.05, h_pad=0.05))
-        # Grids within a grid: columns of one width for all rows would have no room for the labels between them.
-        rows = page.add_gridspec(4, 1, height_ratios=(1.1, 1.7, 1.7, 2.6))
-        enlarged, curves = rows[1].subgridspec(1, 5), rows[3].subgridspec(2, 2)
-        first, end = display.strongest_span(assessment.target, assessment.rate_hz)
-        strongest = (
-            assessment.start_s + first / assessment.rate_hz,
-            assessment.start_s + (end - 1) / assessment.rate_hz,
-        )
-        history = plot_time_history(assessment, ax=page.add_subplot(rows[0]))
-        history.axvspan(*strongest, color="#000000", alpha=0.08, linewidth=0)
-        zoomed = plot_time_history(assessment, ax=page.add_subplot(enlarged[:3]), span_s=strongest)
-        loop = plot_loop(assessment, ax=page.add_subplot(enlarged[3:]), span_s=strongest)
-        spectra = plot_spectra(assessment, ax=page.add_subplot(rows[2]))
-        moving = [page.add_subplot(curves[row, 0]) for row in (0, 1)]
-        plot_moving(assessment, ax=moving)
-        response = [page.add_subplot(curves[row, 1]) for row in (0, 1)]
-        plot_frequency_response(assessment, ax=response)
-        for axis, letter in zip((history, zoomed, loop, spectra, *moving, *response), "abcdefgh", strict=True):
-            axis.set_title(f"({letter})", loc="left", fontweight="bold", pad=3)
-    return page
+def plot_time_frequency(
+    assessment: Assessment, *, ax: Sequence[Axes] | NDArray[Any] | None = None
+) -> Sequence[Axes] | NDArray[Any]:
+    """Gain and delay (ms) over time and frequency on two axes, in half octaves; empty where the coherence is low.
 
-
-def write_figure(assessment: Assessment, path: str | Path) -> None:
-    """Write `figure(assessment)` as PNG (600 dpi), PDF or SVG, by the ending of `path`.
-
-    Errors: SettingError where the ending is another, or the file cannot be written.
+    Drawn only where they change with both; else the axes say so.
     """
-    ending = Path(path).suffix.lower().removeprefix(".")
-    if ending not in _FORMATS:
-        found = f"ends in .{ending}" if ending else "has no ending"
-        raise SettingError(f"{path}: a figure is written as .png, .pdf or .svg, this name {found}; choose one of these")
-    page = figure(assessment)
-    try:
-        with _style():
-            page.savefig(path, format=ending)
-    except OSError as error:
-        raise SettingError(
-            f"{path}: cannot write the figure there ({error.strerror}); name a file in an existing, writable folder"
-        ) from error
+    with _style():
+        ax = _several(ax, 2, 3.6)
+        found = assessment.time_frequency()
+        if found is None:
+            for one in ax:
+                _note(one, "gain and delay do not change with both time and frequency")
+            return ax
+        low, high = found.bands[0].low_hz, found.bands[-1].high_hz
+        for axis, name, factor, label in ((ax[0], "gain", 1.0, "Gain (-)"), (ax[1], "delay_s", 1e3, "Delay (ms)")):
+            rows = [factor * values for values in found.known(name)]
+            # One odd cell is not to take the contrast of the others.
+            ends = np.nanquantile(np.concatenate(rows), (0.02, 0.98))
+            norm = matplotlib.colors.Normalize(*ends)
+            for band, values in zip(found.bands, rows, strict=True):
+                centres = assessment.start_s + band.time_s
+                edges = np.append(centres - band.hop_s / 2, centres[-1] + band.hop_s / 2)
+                axis.pcolormesh(edges, [band.low_hz, band.high_hz], values[np.newaxis], cmap="cividis", norm=norm)
+            axis.set_yscale("log")
+            axis.set_ylim(low, high)
+            axis.set_xlim(assessment.start_s, assessment.start_s + assessment.target.size / assessment.rate_hz)
+            log_ticks(axis, "y")
+            even_ticks(axis, "x")
+            axis.set_ylabel("Frequency (Hz)")
+            axis.set_xlabel("Time (s)")
+            # Above the axes, where it takes no width from the time.
+            bar = axis.inset_axes((0.6, 1.06, 0.27, 0.05))
+            colours = matplotlib.cm.ScalarMappable(norm=norm, cmap="cividis")
+            scale = axis.figure.colorbar(colours, cax=bar, orientation="horizontal", ticks=[])
+            scale.outline.set_visible(False)
+            for at, value, side in ((-0.03, ends[0], "right"), (1.03, ends[1], "left")):
+                bar.text(at, 0.5, display.significant(float(value), 3), transform=bar.transAxes, ha=side, va="center")
+            bar.text(-0.5, 0.5, label, transform=bar.transAxes, ha="right", va="center")
+    return ax
 
 
 def _label(name: str, unit: str | None) -> str:
@@ -354,22 +357,16 @@ def _span(assessment: Assessment, span_s: tuple[float, float] | None) -> tuple[N
 def _time_axis(ax: Axes, time_s: NDArray[np.float64]) -> None:
     ax.set_xlim(time_s[0], time_s[-1])
     ax.set_xlabel("Time (s)")
+    even_ticks(ax, "x")
+    even_ticks(ax, "y")
 
 
 def _frequency_axis(ax: Axes, low: float, high: float) -> None:
-    """A logarithmic axis whose labels are plain numbers: 1 2 5 over a few decades, whole decades over more."""
+    """A logarithmic axis whose labels are plain numbers."""
     if low < high:
         ax.set_xlim(low, high)
-    few = high < 300 * low
-    ax.xaxis.set_major_locator(matplotlib.ticker.LogLocator(subs=(1, 2, 5) if few else (1,)))
-    ax.xaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(lambda value, _: f"{value:g}"))
-    ax.xaxis.set_minor_formatter(matplotlib.ticker.NullFormatter())
+    log_ticks(ax, "x")
     ax.set_xlabel("Frequency (Hz)")
-
-
-def _few_ticks(ax: Axes) -> None:
-    for axis in (ax.xaxis, ax.yaxis):
-        axis.set_major_locator(matplotlib.ticker.MaxNLocator(5, steps=[1, 2, 5, 10]))
 
 
 def _slope_lines(gain_axis: Axes, delay_axis: Axes, slopes: FrequencySlopes | None) -> None:
@@ -405,16 +402,20 @@ def _ms(seconds: float | None) -> float | None:
 
 def _mark_equivalent_frequency(ax: Axes, assessment: Assessment, labelled: bool = True) -> None:
     f_eq = float(assessment.tracking.equivalent_frequency_hz)
-    if not np.isfinite(f_eq):
+    low, high = ax.get_xlim()
+    # Text has no axes to be cut off by.
+    if not low < f_eq < high:
         return
     ax.axvline(f_eq, color=MUTED, linewidth=0.7, linestyle=(0, (4, 3)))
     if labelled:
+        right = f_eq**2 > low * high
         ax.annotate(
-            r"$f_\mathrm{eq}$",
+            f"f_eq {display.significant(f_eq, 3)} Hz",
             (f_eq, 1),
             xycoords=("data", "axes fraction"),
-            xytext=(3, -2),
+            xytext=(-3 if right else 3, -2),
             textcoords="offset points",
+            ha="right" if right else "left",
             va="top",
             color=MUTED,
         )

@@ -25,6 +25,13 @@ DRAWN_GREY_BELOW = 0.8
 #: The part of a record that is shown enlarged, in seconds.
 STRONGEST_S = 4.0
 
+#: The panels of a figure.
+PANELS = (
+    "history", "strongest", "loop", "error", "spectra", "moving", "response", "indices", "time-frequency",
+)  # fmt: skip
+#: Shortest and longest side of a figure, in inches: less has no room for labels.
+FIGURE_IN = (1.5, 50.0)
+
 #: Every estimator, and what it is called beside the others.
 ESTIMATORS = {"fei": "published", "aligned": "aligned", "least_squares": "least squares"}
 
@@ -42,7 +49,7 @@ INDICES = (
 )  # fmt: skip
 
 _ROLES = {"whole": ("target", "measured"), "compensator": ("target", "command"), "actuator": ("command", "measured")}
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def estimator_in_full(name: str) -> str:
@@ -77,7 +84,7 @@ def significant(value: float, digits: int = 4) -> str:
     if -4 <= power < 6:
         return f"{value:.{max(digits - 1 - power, 0)}f}".replace("-", "\N{MINUS SIGN}")
     mantissa = mantissa.replace("-", "\N{MINUS SIGN}")
-    return f"{mantissa}\N{MULTIPLICATION SIGN}10{str(power).translate(_SUPERSCRIPTS)}"
+    return f"{mantissa}\N{MULTIPLICATION SIGN}10{str(power).translate(SUPERSCRIPTS)}"
 
 
 def with_interval(value: float, interval: Sequence[float], unit: str = "") -> str:
