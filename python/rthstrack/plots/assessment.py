@@ -133,8 +133,10 @@ def plot_spectra(assessment: Assessment, *, ax: Axes | None = None) -> Axes:
         # The curves belong in front of the weights, although the weights' axis was added later.
         ax.set_zorder(weight_axis.get_zorder() + 1)
         ax.patch.set_visible(False)
-        ax.loglog(frequency, target, color=TARGET, label=target_role)
-        ax.loglog(frequency, measured, color=MEASURED, label=measured_role, linewidth=0.7)
+        ax.set_xscale("log")
+        ax.set_yscale("log")
+        ax.plot(frequency, target, color=TARGET, label=target_role)
+        ax.plot(frequency, measured, color=MEASURED, label=measured_role, linewidth=0.7)
         _frequency_axis(ax, *shown)
         peak = max(target[inside].max(initial=0.0), measured[inside].max(initial=0.0))
         low = min(target[inside].min(initial=peak), measured[inside].min(initial=peak))
@@ -178,13 +180,15 @@ def plot_frequency_response(
         ):
             axis.axhline(ideal, color=MUTED, linewidth=0.5)
             axis.fill_between(frequency, interval[:, 0], interval[:, 1], color=VALUE, alpha=BAND, linewidth=0)
-            axis.semilogx(frequency, values, color=DOUBTFUL)
-            axis.semilogx(frequency, np.where(sure, values, np.nan), color=VALUE, linewidth=1)
+            axis.set_xscale("log")
+            axis.plot(frequency, values, color=DOUBTFUL)
+            axis.plot(frequency, np.where(sure, values, np.nan), color=VALUE, linewidth=1)
             relied_on = values[sure & in_view]
             value_range(axis, relied_on if relied_on.size else values[in_view], ideal, least)
         for coherence_axis in ax[2:]:
-            coherence_axis.semilogx(frequency, coherence, color=DOUBTFUL)
-            coherence_axis.semilogx(frequency, np.where(sure, coherence, np.nan), color=VALUE, linewidth=1)
+            coherence_axis.set_xscale("log")
+            coherence_axis.plot(frequency, coherence, color=DOUBTFUL)
+            coherence_axis.plot(frequency, np.where(sure, coherence, np.nan), color=VALUE, linewidth=1)
             coherence_axis.axhline(display.DRAWN_GREY_BELOW, color=MUTED, linewidth=0.5, linestyle=(0, (1, 2)))
             coherence_axis.set_ylim(0, 1.05)
             coherence_axis.set_ylabel("Coherence (-)")

@@ -104,7 +104,7 @@ def figure(
             top -= scale * needed
         if len(found) > 1:
             for axis, letter in zip(found, "abcdefghijklmnopqrstuvwxyz", strict=False):
-                axis.set_title(f"({letter})", loc="left", fontweight="bold", pad=3)
+                axis.set_title(f"({letter})", loc="left", y=1.0, pad=3)
     return page
 
 
