@@ -424,7 +424,8 @@
       const words = field.value.toLowerCase().split(/\s+/).filter(Boolean);
       let shown = 0;
       for (const row of rows) {
-        const text = row.textContent.toLowerCase();
+        const named = [...row.cells].filter((cell) => !cell.classList.contains("number"));
+        const text = named.map((cell) => cell.textContent.toLowerCase()).join(" ");
         row.hidden = !words.every((word) => text.includes(word));
         if (!row.hidden) shown++;
       }

@@ -113,7 +113,11 @@ def report_html(assessments: Sequence[Assessment]) -> str:
     return "\n".join(parts)
 
 
-_WORDS = {"exceeded": "exceed a limit", "not_judged": "cannot be judged", "passed": "are within the limits"}
+_WORDS = {
+    "exceeded": ("exceeds a limit", "exceed a limit"),
+    "not_judged": ("cannot be judged", "cannot be judged"),
+    "passed": ("is within the limits", "are within the limits"),
+}
 _HEADS = {"exceeded": "FAIL", "not_judged": "CANNOT BE JUDGED", "passed": "PASS"}
 
 
@@ -131,7 +135,9 @@ def _title(assessments: Sequence[Assessment]) -> str:
         return f"{opening}{Path(_source(assessments[0])).name}: {numbers}"
     n_files = len({a.file for a in assessments})
     what = f"{len(assessments)} pairs in {n_files} {'file' if n_files == 1 else 'files'}"
-    told = ", ".join(f"{outcomes[state]} {words}" for state, words in _WORDS.items() if outcomes[state])
+    told = ", ".join(
+        f"{outcomes[state]} {words[outcomes[state] > 1]}" for state, words in _WORDS.items() if outcomes[state]
+    )
     return f"{opening}{what}: {told or numbers}"
 
 
@@ -207,7 +213,7 @@ _COLUMNS = (
     _Column("Part", lambda a: escape(a.part), lambda a: a.part, False),
     _numbers("Amplitude", "amplitude", lambda a: float(a.tracking.amplitude)),
     _numbers("Delay (ms)", "delay_s", lambda a: float(a.tracking.delay_s), 1e3),
-    _Column("95 % interval", _between, _width),
+    _Column("95 % interval", _between, _width, css="between"),
     _numbers("Worst window (ms)", "worst_window_delay_s", lambda a: a.largest_delay_s, 1e3),
     _numbers("Trusted delay (ms)", "trusted_delay_s", lambda a: float(a.trusted.delay_s), 1e3),
     _numbers("Published delay (ms)", "published_delay_s", lambda a: float(a.published.delay_s), 1e3),
@@ -225,7 +231,9 @@ def _shown(column: _Column, assessments: Sequence[Assessment]) -> bool:
         return any(a.tracking is not a.trusted for a in assessments)
     if column.head == "Published delay (ms)":
         return any(a.tracking is not a.published for a in assessments)
-    if column.head in ("Actuator", "Part", "Signals"):
+    if column.head == "Actuator":
+        return len({a.actuator for a in assessments}) > 1
+    if column.head in ("Part", "Signals"):
         return len({column.html(a) for a in assessments}) > 1
     return any(column.html(a) not in ("", "none") for a in assessments)
 
