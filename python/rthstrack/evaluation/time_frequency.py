@@ -134,7 +134,8 @@ def _octave(
     window = min(round(_SEGMENTS * segment_s * rate_hz), target.size)
     hop = max(window / _READINGS, (target.size - window) / _MOST_READINGS)
     starts = np.arange(0, target.size - window + 1, hop).astype(np.intp)
-    frequency, rows = np.empty(0), []
+    frequency: Floats = np.empty(0)
+    rows: list[Floats | None] = []
     for start in starts:
         part = slice(start, start + window)
         try:
@@ -157,8 +158,7 @@ def _octave(
         weights = np.nansum(stacked[:, 0, inside], axis=0)
         if not float(weights.sum()) > 0:
             continue
-        means = stacked[:, 1:, inside] @ (weights / weights.sum())
-        bands.append(
-            Band(first, last, window / rate_hz, hop / rate_hz, (starts + (window - 1) / 2) / rate_hz, *means.T)
-        )
+        means: Floats = stacked[:, 1:, inside] @ (weights / weights.sum())
+        centres: Floats = (starts + (window - 1) / 2) / rate_hz
+        bands.append(Band(first, last, window / rate_hz, hop / rate_hz, centres, *means.T))
     return bands

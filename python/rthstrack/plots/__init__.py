@@ -15,7 +15,7 @@ from rthstrack.plots.assessment import (
     plot_time_frequency,
     plot_time_history,
 )
-from rthstrack.plots.page import PANELS, figure, write_figure, write_figures
+from rthstrack.plots.page import figure, write_figure, write_figures
 from rthstrack.plots.style import (
     BAND,
     DOUBLE_COLUMN_IN,
@@ -30,6 +30,7 @@ from rthstrack.plots.style import (
     THIRD,
     VALUE,
 )
+from rthstrack.verdict.display import PANELS
 
 __all__ = [
     "BAND",
