@@ -150,6 +150,7 @@ def _octave(
         rows.append(np.stack((found.target_psd, found.gain, found.delay_s, found.coherence, *half)))
     missing = np.full((6, frequency.size), np.nan)
     stacked = np.stack([missing if row is None else row for row in rows])
+    centres = np.asarray((starts + (window - 1) / 2) / rate_hz, dtype=np.float64)
     middle = low * math.sqrt(2)
     bands = []
     for first, last in ((low, middle), (middle, high)):
@@ -159,6 +160,5 @@ def _octave(
         if not float(weights.sum()) > 0:
             continue
         means: Floats = stacked[:, 1:, inside] @ (weights / weights.sum())
-        centres: Floats = (starts + (window - 1) / 2) / rate_hz
         bands.append(Band(first, last, window / rate_hz, hop / rate_hz, centres, *means.T))
     return bands

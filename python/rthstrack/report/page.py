@@ -181,19 +181,31 @@ def _name(a: Assessment, several_files: bool, several_actuators: bool) -> str:
     return " · ".join(parts)
 
 
+def _always(_: Sequence[Assessment]) -> bool:
+    return True
+
+
 @dataclasses.dataclass(frozen=True, slots=True)
 class _Column:
-    """A column of the summary: what a row says, and what it is sorted by; a number where `is_number`."""
+    """A column of the summary: what a row says, what it is sorted by, and of which assessments it says something."""
 
     head: str
     html: Callable[[Assessment], str]
     key: Callable[[Assessment], float | str]
+    is_shown: Callable[[Sequence[Assessment]], bool] = _always
     is_number: bool = True
     css: str = ""
 
 
-def _numbers(head: str, field: str, of: Callable[[Assessment], float], factor: float = 1.0, css: str = "") -> _Column:
-    return _Column(head, lambda a: _number(field, of(a), factor=factor), lambda a: of(a), css=css)
+def _number_column(
+    head: str,
+    field: str,
+    of: Callable[[Assessment], float],
+    factor: float = 1.0,
+    is_shown: Callable[[Sequence[Assessment]], bool] = _always,
+    css: str = "",
+) -> _Column:
+    return _Column(head, lambda a: _number(field, of(a), factor=factor), of, is_shown, css=css)
 
 
 def _between(a: Assessment) -> str:
@@ -206,41 +218,42 @@ def _width(a: Assessment) -> float:
     return float(a.tracking.delay_interval_s[1] - a.tracking.delay_interval_s[0])
 
 
+def _differs(key: Callable[[Assessment], Any]) -> Callable[[Sequence[Assessment]], bool]:
+    """Whether it is not the same in all rows."""
+    return lambda found: len({key(a) for a in found}) > 1
+
+
 _OUTCOME_ORDER = {"exceeded": 0.0, "not_judged": 1.0, "passed": 2.0, None: 3.0}
 _COLUMNS = (
-    _Column("Outcome", lambda a: _OUTCOMES[a.outcome], lambda a: _OUTCOME_ORDER[a.outcome], is_number=False),
-    _Column("Actuator", lambda a: f"{a.actuator_number} {escape(a.actuator_name)}", lambda a: a.actuator, False),
-    _Column("Part", lambda a: escape(a.part), lambda a: a.part, False),
-    _numbers("Amplitude", "amplitude", lambda a: float(a.tracking.amplitude)),
-    _numbers("Delay (ms)", "delay_s", lambda a: float(a.tracking.delay_s), 1e3),
-    _Column("95 % interval", _between, _width, css="between"),
-    _numbers("Worst window (ms)", "worst_window_delay_s", lambda a: a.largest_delay_s, 1e3),
-    _numbers("Trusted delay (ms)", "trusted_delay_s", lambda a: float(a.trusted.delay_s), 1e3),
-    _numbers("Published delay (ms)", "published_delay_s", lambda a: float(a.published.delay_s), 1e3),
-    _numbers("At (Hz)", "equivalent_frequency_hz", lambda a: float(a.tracking.equivalent_frequency_hz), css="minor"),
-    _numbers("RMS error (%)", "rms_error_percent", lambda a: a.indices.rms_error_percent),
+    _Column("Outcome", lambda a: _OUTCOMES[a.outcome], lambda a: _OUTCOME_ORDER[a.outcome],
+            lambda found: any(a.outcome for a in found), is_number=False),
+    _Column("Actuator", lambda a: f"{a.actuator_number} {escape(a.actuator_name)}", lambda a: a.actuator,
+            _differs(lambda a: a.actuator), is_number=False),
+    _Column("Part", lambda a: escape(a.part), lambda a: a.part, _differs(lambda a: a.part), is_number=False),
+    _number_column("Amplitude", "amplitude", lambda a: float(a.tracking.amplitude)),
+    _number_column("Delay (ms)", "delay_s", lambda a: float(a.tracking.delay_s), 1e3),
+    _Column("95 % interval", _between, _width, lambda found: any(math.isfinite(_width(a)) for a in found),
+            css="between"),
+    _number_column("Worst window (ms)", "worst_window_delay_s", lambda a: a.largest_delay_s, 1e3,
+                   lambda found: any(a.moving is not None for a in found)),
+    # What stands beside the judged estimate, where that is another.
+    _number_column("Trusted delay (ms)", "trusted_delay_s", lambda a: float(a.trusted.delay_s), 1e3,
+                   lambda found: any(a.tracking is not a.trusted for a in found)),
+    _number_column("Published delay (ms)", "published_delay_s", lambda a: float(a.published.delay_s), 1e3,
+                   lambda found: any(a.tracking is not a.published for a in found)),
+    _number_column("At (Hz)", "equivalent_frequency_hz", lambda a: float(a.tracking.equivalent_frequency_hz),
+                   css="minor"),
+    _number_column("RMS error (%)", "rms_error_percent", lambda a: a.indices.rms_error_percent),
     _Column("Signals", lambda a: f"{escape(a.target_name)} → {escape(a.measured_name)}", lambda a: a.target_name,
-            is_number=False, css="minor"),
-    _Column("Warnings", lambda a: str(len(a.warnings) or ""), lambda a: len(a.warnings), css="minor"),
+            _differs(lambda a: (a.target_name, a.measured_name)), is_number=False, css="minor"),
+    _Column("Warnings", lambda a: str(len(a.warnings) or ""), lambda a: len(a.warnings),
+            lambda found: any(a.warnings for a in found), css="minor"),
 )  # fmt: skip
-
-
-def _shown(column: _Column, assessments: Sequence[Assessment]) -> bool:
-    """Whether a column says something: it differs from row to row, or holds numbers of an estimate beside the first."""
-    if column.head == "Trusted delay (ms)":
-        return any(a.tracking is not a.trusted for a in assessments)
-    if column.head == "Published delay (ms)":
-        return any(a.tracking is not a.published for a in assessments)
-    if column.head == "Actuator":
-        return len({a.actuator for a in assessments}) > 1
-    if column.head in ("Part", "Signals"):
-        return len({column.html(a) for a in assessments}) > 1
-    return any(column.html(a) not in ("", "none") for a in assessments)
 
 
 def _summary(assessments: Sequence[Assessment]) -> str:
     """The table of all, one row an assessment, the worst first; its heads sort it, its field filters it."""
-    columns = [column for column in _COLUMNS if _shown(column, assessments)]
+    columns = [column for column in _COLUMNS if column.is_shown(assessments)]
     places: dict[int, list[int]] = {}
     for number, a in enumerate(assessments):
         places.setdefault(id(a), []).append(number)
