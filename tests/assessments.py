@@ -57,6 +57,19 @@ def synthetic(
     return motion(t) + noise[0], gain * motion(t - delay_s) + noise[1]
 
 
+def varying_over_both(rate_hz: float = 256.0) -> Assessment:
+    """A delay that rises by 1.5 ms a hertz and by 6 ms over the record, made from the definition."""
+    n = 15_000
+    t, rng = np.arange(n) / rate_hz, np.random.default_rng(0)
+    f = np.fft.rfftfreq(2 * n, 1 / rate_hz)
+    spectrum = (rng.normal(size=f.size) + 1j * rng.normal(size=f.size)) * np.exp(-((f / 4) ** 2)) * (f > 0.2)
+    target = np.fft.irfft(spectrum, 2 * n)
+    target *= 10 / target.std()
+    later = np.fft.irfft(np.fft.rfft(target) * np.exp(-2j * np.pi * f * (0.012 + 0.0015 * np.minimum(f, 6))))[:n]
+    measured = np.interp(t - 0.006 * t / t[-1], t, later) + 0.02 * rng.normal(size=n)
+    return judged(target[:n], measured, rate_hz)
+
+
 def parts_of_a_test(limits: Limits | None = None) -> list[Assessment]:
     """Target, command and measured of one actuator as whole, compensator and actuator."""
     target, command = synthetic(delay_s=-0.025, gain=1.0)

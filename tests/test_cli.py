@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rthstrack.cli import main
+from rthstrack.cli import arguments, main
 
 RATE = 200.0
 KEYS = {
@@ -222,6 +222,30 @@ def test_outputs_are_written_where_asked(capsys: pytest.CaptureFixture[str], rec
     assert err.count("written to") == 5
 
 
+def test_a_second_figure_does_not_replace_the_first(capsys: pytest.CaptureFixture[str], recorded: Path) -> None:
+    out = recorded.parent
+    figures = [item for name in ("f.svg", "f.pdf") for item in ("--figure", out / name)]
+    status, _, err = run(capsys, recorded, *figures, "--panels", "error,loop", "--size", "85x120mm")
+    assert status == 0
+    assert err.splitlines() == [f"figure written to {out / name}" for name in ("f.svg", "f.pdf")]
+    points = 72 / 25.4
+    assert f"/MediaBox [ 0 0 {85 * points:.2f}"[:22].encode() in (out / "f.pdf").read_bytes()
+    assert (out / "f.svg").read_bytes().startswith(b"<?xml")
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("85mm", (85, None)), ("85x120mm", (85, 120)), ("8.5 cm x 12 cm", (85, 120)), ("7.2x9in", (182.88, 228.6)),
+        ("85mmx4in", (85, 101.6)),
+    ],
+)  # fmt: skip
+def test_a_size_has_units(text: str, found: tuple[float, float | None]) -> None:
+    width, height = arguments.size(text)
+    assert 25.4 * width == pytest.approx(found[0])
+    assert height is None if found[1] is None else 25.4 * (height or 0) == pytest.approx(found[1])
+
+
 @pytest.mark.parametrize(
     "options",
     [
@@ -231,7 +255,10 @@ def test_outputs_are_written_where_asked(capsys: pytest.CaptureFixture[str], rec
         ["--rate", "inf"], ["--moving", 0], ["--hop", -1], ["--start", -1], ["--start", 5, "--end", 5], ["--fill", 0],
         ["--fill", 1.5], ["--resample", 0], ["--limit-delay", 0], ["--limit-amplitude", "x"], ["--scale", "x"],
         ["--scale", "x=0"], ["--scale", "=2"], ["--target", "#1"], ["--measured", "#1"], ["--report", "r.pdf"],
-        ["--figure", "f.bmp"], ["--csv", "r.txt"], ["--report", "nowhere/r.html"], ["--rate", 5, "--time", "t"],
+        ["--figure", "f.bmp"], ["--panels", "error"], ["--figure", "f.pdf", "--panels", "errors"], ["--size", "85mm"],
+        ["--figure", "f.pdf", "--size", "85"], ["--figure", "f.pdf", "--size", "x"],
+        ["--figure", "f.pdf", "--size", "1mm"], ["--figure", "f.pdf", "--size", "85s"], ["--figure", "nowhere/f.pdf"],
+        ["--csv", "r.txt"], ["--report", "nowhere/r.html"], ["--rate", 5, "--time", "t"],
         ["--rate", 5, "--resample", 5], ["--target", "#1", "--measured", "#2", "--command", "#3", "--command", "#4"],
     ],
     ids=lambda options: " ".join(map(str, options)),

@@ -70,7 +70,7 @@ def test_all_mistakes_are_told_at_once_a_line_each_and_nothing_is_started(
     assert all(line.startswith("rthstrack: ") for line in err)
     wanted = [
         "--listen: expected udp://HOST:PORT", "--rate is missing", "counter: expected one of", "byte_ordr: no such key",
-        "actuator[1].measured: missing", "--window: expected a positive", "--band: expected a number, found 'x'",
+        "actuator[1].measured: missing", "--window: expected a positive", "--band: expected two finite frequencies",
         "--estimator: "
         "expected one of", "-P: expected a power of two", "--critical-fraction speaks of", "--page-host speaks of",
         "--hysteresis: expected", "is there already", "there is no directory", "--readings: expected a port",
@@ -125,7 +125,7 @@ def test_all_mistakes_are_told_at_once_a_line_each_and_nothing_is_started(
             "up to a quarter of --window, 0.125 s: expected less, or a larger --window",
         ),
         ([*UDP, "--limit-delay", "-0.01"], "--limit-delay: expected a positive duration"),
-        ([*UDP, "--limit-amplitude", "x"], "--limit-amplitude: expected a number, found 'x'"),
+        ([*UDP, "--limit-amplitude", "x"], "--limit-amplitude: expected a positive number, found 'x'"),
         ([*UDP, "--limit-lost", "0"], "--limit-lost: expected a whole number from 1 on"),
         ([*UDP, "--silence", "inf"], "--silence: expected a finite number"),
         ([*UDP, "--alarm-to", "127.0.0.1:5"], "--alarm-to: expected udp://HOST:PORT"),
@@ -234,7 +234,7 @@ def test_defaults_are_those_that_the_help_states(capsys: pytest.CaptureFixture[s
     made = fake.made
     assert made.monitor == {
         "rate_hz": 1024.0, "window_s": 4.0, "update_hz": 16.0, "band_hz": (0.0, 32.0), "window": "boxcar",
-        "detrend": None, "estimator": "least_squares", "data_decimation": 8, "frequency_decimation": 1,
+        "detrend": "mean", "estimator": "least_squares", "data_decimation": 8, "frequency_decimation": 1,
         "max_delay_s": 0.25, "expected_delay_s": None, "minimum_amplitude": 0.0, "n_actuators": 2,
     }  # fmt: skip
     assert made.source["layout"]["sample_bytes"] == 40

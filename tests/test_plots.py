@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
+import math
 import subprocess
 import sys
 import threading
@@ -14,8 +16,11 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis, XAxis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 import assessments as examples
 from rthstrack import plots
@@ -190,6 +195,123 @@ def test_the_composed_figure_has_every_panel(judged: Assessment) -> None:
     low, high = zoomed.get_xlim()
     assert high - low == pytest.approx(4.0, abs=0.02)
     assert history.get_xlim() == pytest.approx((2.5, 2.5 + 11_999 / 200))
+
+
+def test_panels_are_chosen_by_name_in_order_and_the_figure_has_the_size_asked_for(judged: Assessment) -> None:
+    page = plots.figure(judged, panels=("moving", "error"), size_in=(85 / 25.4, 4.0))
+    assert page.get_size_inches() == pytest.approx((85 / 25.4, 4.0))
+    assert [ax.get_ylabel() for ax in page.axes] == ["A (-)", "d (ms)", "Error (mm)"]
+    tops = [ax.get_position().y1 for ax in page.axes]
+    assert tops == sorted(tops, reverse=True)
+    assert [ax.get_title(loc="left") for ax in plots.figure(judged, panels=("error",)).axes] == [""]
+    with pytest.raises(SettingError, match="no panel 'moved'; choose among history, strongest"):
+        plots.figure(judged, panels=("moved",))
+    with pytest.raises(SettingError, match=r"from 1\.5 to 50 in, found 0\.5 in"):
+        plots.figure(judged, size_in=(0.5, None))
+
+
+@pytest.mark.parametrize("size_in", [None, (85 / 25.4, None)])
+def test_no_text_of_a_figure_covers_another_or_is_cut_off(
+    size_in: tuple[float, float | None] | None, judged: Assessment
+) -> None:
+    page = plots.figure(judged, panels=plots.PANELS, size_in=size_in)
+    canvas = FigureCanvasAgg(page)
+    canvas.draw()
+    renderer, whole = canvas.get_renderer(), page.bbox
+    for ax in page.axes:
+        for axis in (ax.xaxis, ax.yaxis):
+            # The loop has no room for more than its axes' own; a note has none.
+            low, high = sorted(axis.get_view_interval())
+            ticks = [at for at in axis.get_majorticklocs() if low <= at <= high]
+            assert len(ticks) >= 3 or ax.texts or not ticks, (ax.get_ylabel(), ticks)
+            drawn = [label for label in axis.get_ticklabels() if label.get_visible() and label.get_text()]
+            boxes = [label.get_window_extent(renderer) for label in drawn]
+            boxes = [box for box, label in zip(boxes, drawn, strict=True) if low <= _place(label, axis) <= high]
+            for one, other in itertools.pairwise(boxes):
+                assert not one.overlaps(other), (ax.get_ylabel(), [label.get_text() for label in drawn])
+            boxes.append(axis.label.get_window_extent(renderer))
+            for box in boxes:
+                assert box.width == 0 or (whole.x0 <= box.x0 and box.x1 <= whole.x1), ax.get_ylabel()
+                assert box.width == 0 or (whole.y0 <= box.y0 and box.y1 <= whole.y1), ax.get_ylabel()
+
+
+def _place(label: Text, axis: Axis) -> float:
+    return float(label.get_position()[0 if isinstance(axis, XAxis) else 1])
+
+
+def test_the_equivalent_frequency_is_named_once_and_within_its_axes(judged: Assessment) -> None:
+    page = plots.figure(judged)
+    named = [(ax, text) for ax in page.axes for text in ax.texts if text.get_text().startswith("f_eq")]
+    ((ax, text),) = named
+    assert text.get_text() == f"f_eq {judged.tracking.equivalent_frequency_hz:.3g} Hz"
+    FigureCanvasAgg(page).draw()
+    box = text.get_window_extent()
+    assert ax.bbox.x0 <= box.x0 < box.x1 <= ax.bbox.x1
+    assert ax.bbox.y0 <= box.y0 < box.y1 <= ax.bbox.y1 + 1
+
+
+def test_windows_over_a_limit_are_shaded(judged: Assessment) -> None:
+    tight = examples.judged(*examples.synthetic(), 200.0, limits=Limits(delay_s=0.02), hop_s=0.5)
+    (gate,) = tight.gates
+    assert gate.over_s
+    amplitude_axis, delay_axis = plots.plot_moving(tight)
+    spans = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in delay_axis.patches]
+    assert spans == [pytest.approx((first - 0.25, last + 0.25)) for first, last in gate.over_s]
+    assert not list(amplitude_axis.patches)
+    assert not [patch for ax in plots.plot_moving(judged) for patch in ax.patches]
+
+
+def test_a_long_record_is_drawn_by_its_extremes() -> None:
+    target, measured = examples.synthetic(100_000, 1000.0)
+    target[54_321] = 99.0
+    long = examples.judged(target, measured, 1000.0, moving_evaluation=False, response=False)
+    line = plots.plot_time_history(long).lines[0]
+    values = np.asarray(line.get_ydata())
+    assert values.size < 10_000
+    assert values.max() == 99.0
+    assert np.asarray(line.get_xdata())[values.argmax()] == pytest.approx(54.321)
+
+
+def test_time_and_frequency_are_drawn_where_gain_or_delay_change_with_both(judged: Assessment) -> None:
+    for ax in plots.plot_time_frequency(judged):
+        assert "do not change with both" in ax.texts[0].get_text()
+    both = examples.varying_over_both()
+    found = both.time_frequency()
+    assert found is not None
+    assert "delay_s" in found.changes_with_both
+    for band in found.bands:
+        middle = math.sqrt(band.low_hz * band.high_hz)
+        true = 0.012 + 0.0015 * middle + 0.006 * band.time_s / (both.target.size / both.rate_hz)
+        np.testing.assert_allclose(band.delay_s, true, atol=0.0012)
+    gain_axis, delay_axis = plots.plot_time_frequency(both)
+    assert len(delay_axis.collections) == len(found.bands) == len(gain_axis.collections)
+    assert delay_axis.get_ylim() == pytest.approx((found.bands[0].low_hz, found.bands[-1].high_hz))
+    assert "time-frequency" in plots.PANELS
+    assert len(plots.figure(both).axes) > len(plots.figure(judged).axes)
+
+
+def test_low_coherence_is_empty_over_time_and_frequency() -> None:
+    both = examples.varying_over_both()
+    found = both.time_frequency()
+    assert found is not None
+    band = found.bands[0]
+    noisy = dataclasses.replace(band, coherence=np.where(np.arange(band.time_s.size) == 1, 0.5, 1.0))
+    (known,) = dataclasses.replace(found, bands=(noisy,)).known("delay_s")
+    assert np.flatnonzero(np.isnan(known)).tolist() == [1]
+
+
+def test_many_figures_are_written_by_several_processes(tmp_path: Path, judged: Assessment) -> None:
+    paths = [tmp_path / f"{number}.svg" for number in range(3)]
+    done: list[int] = []
+    plots.write_figures(
+        [(judged, path) for path in paths],
+        panels=("error",),
+        meanwhile=lambda: done.append(len(list(tmp_path.iterdir()))),
+    )
+    assert len(done) == 1
+    assert all(path.read_bytes().startswith(b"<?xml") for path in paths)
+    with pytest.raises(SettingError, match="cannot write the figure"):
+        plots.write_figures([(judged, tmp_path / "missing" / f"{n}.svg") for n in range(3)], panels=("error",))
 
 
 def test_a_unit_with_a_dollar_sign_is_a_unit_and_not_a_formula(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ import assessments as examples
 from rthstrack.errors import SettingError
 from rthstrack.report import report_html, write_report
 from rthstrack.verdict import Assessment, Limits
+from rthstrack.verdict.order import in_order
 
 FLAGS = [
     "--no-sandbox",
@@ -371,7 +372,10 @@ def test_the_parts_of_a_test_are_tabs_below_a_table_of_all(opened: Callable[...,
     def visible() -> list[int]:
         return [n for n in range(3) if page.locator(report.panel(n)).is_visible()]
 
-    assert visible() == [0]
+    # The worst is open first.
+    (worst,) = visible()
+    order = [int(row.get_attribute("data-assessment") or "") for row in page.locator(".summary tbody tr").all()]
+    assert worst == order[0] == parts.index(in_order(parts)[0])
     tabs = page.get_by_role("tab")
     assert tabs.count() == 3
     tabs.nth(1).click()
@@ -524,8 +528,202 @@ def test_no_window_is_too_narrow_for_the_page(opened: Callable[..., Opened]) -> 
     report = opened(*examples.parts_of_a_test(Limits(delay_s=0.02)))
     for width in (1400, 800, 390):
         report.page.set_viewport_size({"width": width, "height": 900})
-        wait_until(report.page, "document.querySelector('[data-chart=history]').chart.u.width < innerWidth")
+        wait_until(
+            report.page,
+            "document.querySelector('[data-drawn]:not([hidden]) [data-chart=history]').chart.u.width < innerWidth",
+        )
         assert report.page.evaluate("document.documentElement.scrollWidth") == width
+        for inner in (".scroll", ".tabs"):
+            cut = "e => e.scrollWidth > e.clientWidth || e.scrollHeight > e.clientHeight"
+            assert width < 600 or not report.page.locator(inner).evaluate(cut), (inner, width)
+
+
+def pixel(page: Page, chart: str, time_s: float, down: float) -> list[int]:
+    """The colour of a chart at a time, so far down its height; the browser complains where one is read twice."""
+    found: list[int] = page.evaluate(
+        "([name, x, down]) => { const { u } = document.querySelector(`[data-chart=${name}]`).chart;"
+        "const y = u.bbox.top + down * u.bbox.height;"
+        "return [...u.ctx.getImageData(Math.round(u.valToPos(x, 'x', true)), Math.round(y), 1, 1).data].slice(0, 3); }",
+        [chart, time_s, down],
+    )
+    return found
+
+
+def many_runs(n: int = 4) -> list[Assessment]:
+    """Runs of one test, each later than the one before, in another order; the latest two exceed 30 ms."""
+    found = []
+    for k in np.roll(np.arange(n), 1).tolist():
+        target, measured = examples.synthetic(delay_s=0.02 + 0.01 * k, gain=1 + 0.01 * k)
+        limits = Limits(delay_s=0.035)
+        found.append(examples.judged(target, measured, 200.0, file=f"runs/day_{k:02d}.csv", limits=limits))
+    return found
+
+
+def test_the_title_says_the_outcome_and_the_judged_numbers(opened: Callable[..., Opened], plain: Assessment) -> None:
+    title = opened(plain).page.title()
+    assert title.startswith("FAIL · test.csv: delay ")
+    assert number_in(title.partition("delay ")[2]) == pytest.approx(
+        1e3 * float(plain.trusted.delay_s), rel=SHOWN_DIGITS
+    )
+    assert number_in(title.partition("amplitude ")[2]) == pytest.approx(
+        float(plain.trusted.amplitude), rel=SHOWN_DIGITS
+    )
+    runs = many_runs()
+    assert opened(*runs).page.title() == "FAIL · 4 pairs in 4 files: 2 exceed a limit, 2 are within the limits"
+    free = [dataclasses.replace(one, gates=()) for one in runs]
+    assert opened(*free).page.title().startswith("4 pairs in 4 files: delay 20.")
+
+
+def test_the_summary_is_sorted_worst_first_and_by_a_head(opened: Callable[..., Opened]) -> None:
+    runs = many_runs()
+    page = opened(*runs).page
+
+    def column(place: int) -> list[str]:
+        return page.locator(f".summary tbody tr:visible > :nth-child({place})").all_inner_texts()
+
+    delays = [1e3 * float(one.trusted.delay_s) for one in runs]
+    assert column(1) == ["day_03.csv", "day_02.csv", "day_01.csv", "day_00.csv"]
+    head = page.get_by_role("columnheader", name="Delay (ms)", exact=True)
+    place = page.locator(".summary thead th").all_inner_texts().index("Delay (ms)") + 1
+    assert page.locator("[aria-sort]").count() == 0
+    head.get_by_role("button").press("Enter")
+    assert head.get_attribute("aria-sort") == "descending"
+    shown = [number_in(text) for text in column(place)]
+    assert shown == sorted(shown, reverse=True)
+    np.testing.assert_allclose(shown, sorted(delays, reverse=True), rtol=SHOWN_DIGITS)
+    head.get_by_role("button").click()
+    assert head.get_attribute("aria-sort") == "ascending"
+    assert [number_in(text) for text in column(place)] == shown[::-1]
+    page.get_by_role("columnheader", name="File").get_by_role("button").click()
+    assert page.locator("[aria-sort]").count() == 1
+    assert column(1) == ["day_00.csv", "day_01.csv", "day_02.csv", "day_03.csv"]
+    page.get_by_role("searchbox").fill("exceeded 03")
+    assert column(1) == ["day_03.csv"]
+    assert page.locator("[data-matches]").inner_text() == "1 of 4"
+    page.get_by_role("searchbox").fill("")
+    assert len(column(1)) == 4
+
+
+def test_the_published_number_stands_beside_the_judged_one_in_the_summary(opened: Callable[..., Opened]) -> None:
+    runs = many_runs()
+    page = opened(*runs).page
+    for number, one in enumerate(runs):
+        row = page.locator(f'tr[data-assessment="{number}"]')
+        for name, value in (("delay_s", one.trusted.delay_s), ("published_delay_s", one.published.delay_s)):
+            shown = number_in(row.locator(f'[data-field="{name}"]').inner_text())
+            assert shown == pytest.approx(1e3 * float(value), rel=SHOWN_DIGITS)
+    first = dataclasses.replace(runs[0], tracking=runs[0].published)
+    heads = opened(first, *runs[1:]).page.locator(".summary thead th").all_inner_texts()
+    assert "Trusted delay (ms)" in heads
+
+
+def pages(pdf: bytes) -> int:
+    return len(re.findall(rb"/Type\s*/Page\b", pdf))
+
+
+def test_every_run_is_printed_and_begins_on_a_page_of_its_own(opened: Callable[..., Opened]) -> None:
+    runs = many_runs()
+    report = opened(*runs)
+    one = pages(opened(runs[0]).page.pdf(format="A4"))
+    assert one in (2, 3)
+    # The table, two pages a run, and at most one for the footer.
+    assert 1 + 2 * len(runs) <= pages(report.page.pdf(format="A4")) <= 2 + 2 * len(runs)
+    report.page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert all(report.page.locator(report.panel(n)).is_visible() for n in range(4))
+    empty = "[...document.querySelectorAll('.chart')].filter(e => !e.chart || e.chart.u.width < 100).length"
+    assert report.page.evaluate(empty) == 0
+    breaks = "[...document.querySelectorAll('.assessment')].map(e => getComputedStyle(e).breakBefore)"
+    assert report.page.evaluate(breaks) == ["page"] * 4
+    report.page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert sum(report.page.locator(report.panel(n)).is_visible() for n in range(4)) == 1
+
+
+TICKS = """[...document.querySelectorAll('.assessment:not([hidden]) .chart')].flatMap(({ chart, dataset }) =>
+  chart.u.axes.map((axis, i) => [`${dataset.chart} ${'xy'[i]}`, axis._splits.filter(v => v != null).length]))"""
+
+
+@pytest.mark.parametrize("size", [(1400, 900), (800, 900)])
+def test_every_axis_has_three_ticks_at_least(
+    opened: Callable[..., Opened], plain: Assessment, size: tuple[int, int]
+) -> None:
+    report = opened(plain)
+    report.page.set_viewport_size({"width": size[0], "height": size[1]})
+
+    def few() -> list[Any]:
+        return [found for found in report.page.evaluate(TICKS) if found[1] < 3]
+
+    assert few() == []
+    report.drag("history", 0.30, 0.31)
+    report.drag("gain", 0.50, 0.52)
+    assert few() == []
+    report.page.get_by_role("button", name="All frequencies").click()
+    assert few() == []
+
+
+def test_windows_over_a_limit_are_shaded_on_their_own_charts(opened: Callable[..., Opened], plain: Assessment) -> None:
+    report = opened(plain)
+    (drawing,) = json.loads(report.page.locator("#drawing").text_content() or "")
+    (gate,) = [gate for gate in plain.gates if gate.name == "delay"]
+    assert plain.moving is not None
+    half = plain.moving.hop_s / 2
+    assert gate.over_s
+    assert drawing["over"] == {"amplitude": [], "delay": [[a - half, b + half] for a, b in gate.over_s]}
+    middle = (gate.over_s[0][0] + gate.over_s[0][1]) / 2
+    orange, bare = (
+        pixel(report.page, "moving-delay", middle, 0.97),
+        pixel(report.page, "moving-amplitude", middle, 0.97),
+    )
+    assert orange[0] > orange[2] + 30
+    assert max(bare) - min(bare) < 10
+    caption = report.page.locator("[data-chart=moving-delay] + figcaption").inner_text()
+    assert "Orange: over a limit" in caption
+
+
+def test_a_report_of_many_long_runs_stays_small_and_says_what_is_drawn(opened: Callable[..., Opened]) -> None:
+    n = 60_000
+    one = examples.judged(*examples.synthetic(n, 1024.0), 1024.0)
+    rng = np.random.default_rng(3)
+    runs = []
+    for k in range(20):
+        target = one.target + 0.01 * rng.normal(size=n)
+        target[1000 * k + 500] = 50.0
+        runs.append(dataclasses.replace(one, target=target, file=f"run_{k:02d}.csv"))
+    assert len(report_html(runs).encode()) < 4_000_000
+    page = opened(*runs).page
+    shown = page.locator(".assessment:visible")
+    number = int((shown.get_attribute("id") or "").removeprefix("assessment-"))
+    drawn = page.evaluate(
+        f"Array.from(document.querySelector('#assessment-{number} [data-chart=history]').chart.u.data[1])"
+    )
+    assert len(drawn) <= 6_002
+    assert max(drawn) == 50.0
+    assert f"Drawn: {len(drawn)} of 60000 samples" in shown.locator("[data-chart=error] + figcaption").inner_text()
+
+
+def test_the_parts_of_a_long_test_share_the_samples_that_are_drawn() -> None:
+    target, command = examples.synthetic(70_000, 1024.0, delay_s=-0.025, gain=1.0)
+    _, measured = examples.synthetic(70_000, 1024.0, delay_s=0.004, gain=0.99)
+    whole = examples.judged(target, measured, 1024.0)
+    other = dataclasses.replace(whole, file="other.csv", target=command)
+    parts = [whole, dataclasses.replace(whole, part="compensator", measured=command)]
+    drawing = json.loads(re.search(r'id="drawing">(.*?)</script>', report_html([*parts, other]), re.DOTALL)[1])  # type: ignore[index]
+    first, second, third = (one["time"] for one in drawing)
+    assert first["index"] == second["index"]
+    assert first["target"] == second["target"]
+    assert third["index"] != first["index"]
+
+
+def test_gain_and_delay_over_time_and_frequency_are_shown_where_they_change_with_both(
+    opened: Callable[..., Opened], plain: Assessment
+) -> None:
+    assert plain.time_frequency() is None
+    assert opened(plain).page.locator("[data-chart=both-delay]").count() == 0
+    report = opened(examples.varying_over_both())
+    # The dark end of the colours is a short delay: low frequencies early on.
+    assert sum(pixel(report.page, "both-delay", 15.0, 0.9)) < 300
+    low, high = report.scale("both-delay", "y")
+    assert low < 1.5 < 3 < high
+    assert "half octaves" in report.page.locator("[data-chart=both-delay] + figcaption").inner_text()
 
 
 def test_settings_program_and_date_are_in_a_table(opened: Callable[..., Opened], plain: Assessment) -> None:
@@ -605,7 +803,7 @@ def test_a_file_name_that_is_not_text_can_be_reported(tmp_path: Path) -> None:
 
 def test_samples_without_a_file_are_called_that() -> None:
     page = report_html([examples.judged(*examples.synthetic(2000), 200.0, file="")])
-    assert "<title>Tracking in samples given in Python</title>" in page
+    assert "<title>samples given in Python: delay " in page
 
 
 def test_the_vendored_files_are_those_that_the_note_beside_them_names() -> None:

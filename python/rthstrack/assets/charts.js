@@ -16,6 +16,7 @@ const Charts = (() => {
     "rule",
     "surface",
     "shade",
+    "over",
     "target",
     "measured",
     "error",
@@ -43,8 +44,13 @@ const Charts = (() => {
 
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
 
-  /* Paper is white and as wide as it is, whatever the screen was. */
+  /* Paper is white and as wide as it is, whatever the screen was; charts on it are less high. */
+  let onPaper = false;
+  /* No lower than the label of the vertical axis needs. */
+  const paperHeight = (height) => (onPaper ? Math.max(Math.round(0.66 * height), 138) : height);
+
   function paper(printing) {
+    onPaper = printing;
     document.documentElement.classList.toggle("on-paper", printing);
     readColours();
     for (const chart of charts) chart.fit();
@@ -91,28 +97,55 @@ const Charts = (() => {
     return `${lead === 1 ? "" : `${lead}×`}10${raised(power)}`;
   }
 
+  const FEWEST_TICKS = 3;
+
+  /* How many ticks an axis has room for. */
+  const roomFor = (u, axis, across, up) =>
+    axis === 0 ? u.bbox.width / devicePixelRatio / across : u.bbox.height / devicePixelRatio / up;
+
+  /* Ticks at even steps of 1, 2 or 5: as many as there is room for, and never fewer than three. */
+  function evenTicks(u, axis, min, max) {
+    if (!(max > min)) return [min];
+    const rough = (max - min) / Math.max(roomFor(u, axis, 70, 32), 2);
+    let power = Math.floor(Math.log10(rough));
+    let lead = [1, 2, 5, 10].findIndex((s) => s * 10 ** power >= rough * (1 - 1e-9));
+    for (;;) {
+      /* A power below zero divides, so that 0.3 is not 0.30000000000000004. */
+      const at = (k) => (power < 0 ? (k * [1, 2, 5, 10][lead]) / 10 ** -power : k * [1, 2, 5, 10][lead] * 10 ** power);
+      const step = at(1);
+      const ticks = [];
+      for (let k = Math.ceil(min / step - 1e-9); at(k) <= max + 1e-9 * step; k++) ticks.push(at(k));
+      if (ticks.length >= FEWEST_TICKS || step < 1e-12 * Math.max(Math.abs(min), Math.abs(max))) return ticks;
+      if (lead > 0) lead--;
+      else [power, lead] = [power - 1, 2];
+    }
+  }
+
   /* Ticks of a logarithmic axis: even steps inside one decade, 1 2 5 over a few, whole decades over many. */
   function logTicks(u, axis, min, max) {
-    const room = axis === 0 ? u.bbox.width / devicePixelRatio / 55 : u.bbox.height / devicePixelRatio / 26;
+    const room = roomFor(u, axis, 55, 26);
     const decades = Math.log10(max / min);
-    const ticks = [];
-    if (decades < 0.8) {
-      const rough = (max - min) / Math.max(room, 2);
-      const unit = 10 ** Math.floor(Math.log10(rough));
-      const step = unit * [1, 2, 5, 10].find((s) => s * unit >= rough);
-      for (let k = Math.ceil(min / step); k * step <= max * (1 + 1e-12); k++) ticks.push(k * step);
-      return ticks;
-    }
-    const leads = room / decades > 3.2 ? [1, 2, 5] : [1];
+    if (decades < 0.8) return evenTicks(u, axis, min, max);
     const stride = Math.max(1, Math.ceil(decades / Math.max(room, 1)));
-    for (let power = Math.floor(Math.log10(min)); power <= Math.log10(max) + 1e-9; power++) {
-      if (leads.length === 1 && power % stride !== 0) continue;
-      for (const lead of leads) {
-        const tick = Number(`${lead}e${power}`);
-        if (tick >= min * (1 - 1e-12) && tick <= max * (1 + 1e-12)) ticks.push(tick);
+    const [first, last] = [Math.floor(Math.log10(min)), Math.log10(max) + 1e-9];
+    const at = (leads, every) => {
+      const ticks = [];
+      for (let power = first; power <= last; power++) {
+        if (power % every !== 0) continue;
+        for (const lead of leads) {
+          const tick = Number(`${lead}e${power}`);
+          if (tick >= min * (1 - 1e-12) && tick <= max * (1 + 1e-12)) ticks.push(tick);
+        }
       }
+      return ticks;
+    };
+    const choices = [() => at([1], stride), () => at([1], 1), () => at([1, 3], 1), () => at([1, 2, 5], 1)];
+    if (room / decades > 3.2) choices.splice(0, 3);
+    for (const choice of choices) {
+      const ticks = choice();
+      if (ticks.length >= FEWEST_TICKS) return ticks;
     }
-    return ticks;
+    return evenTicks(u, axis, min, max);
   }
 
   // ------------------------------------------------------------------------------------------------ one axis for many
@@ -196,7 +229,7 @@ const Charts = (() => {
       grid: { stroke: () => colour.rule, width: 1 },
       ticks: { show: false },
       border: { show: true, stroke: () => colour.rule, width: 1 },
-      splits: log ? logTicks : undefined,
+      splits: log ? logTicks : evenTicks,
       filter: (u, ticks) => ticks,
       values: values || (log ? (u, ticks) => ticks.map(logLabel) : tickLabels),
     };
@@ -226,13 +259,62 @@ const Charts = (() => {
 
   function drawShades(u, shades) {
     clipped(u, (ctx, box) => {
-      ctx.fillStyle = colour.shade;
-      for (const { from, to } of shades) {
+      for (const { from, to, kind } of shades) {
+        ctx.fillStyle = colour[kind || "shade"];
         const a = u.valToPos(Math.max(from, u.scales.x.min), "x", true);
         const b = u.valToPos(Math.min(to, u.scales.x.max), "x", true);
         if (b > a) ctx.fillRect(a, box.top, b - a, box.height);
       }
     });
+  }
+
+  /* Cividis, which all kinds of colour vision read alike. */
+  const RAMP = [
+    [0, 34, 78],
+    [53, 69, 108],
+    [102, 105, 112],
+    [148, 142, 119],
+    [200, 184, 102],
+    [254, 232, 56],
+  ];
+  function rampColour(part) {
+    const at = Math.min(Math.max(part, 0), 1) * (RAMP.length - 1);
+    const i = Math.min(Math.floor(at), RAMP.length - 2);
+    return `rgb(${RAMP[i].map((v, k) => Math.round(v + (at - i) * (RAMP[i + 1][k] - v))).join(",")})`;
+  }
+
+  /* Cells over the horizontal axis and bands of the vertical one, and above them what the colours mean. */
+  function drawCells(u, cells) {
+    const known = cells.bands.flatMap((band) => band.values.filter((v) => v != null)).sort((a, b) => a - b);
+    if (!known.length) return;
+    /* Both ends of the colours are quantiles: one odd cell is not to take the contrast of the others. */
+    const [low, high] = [0.02, 0.98].map((share) => known[Math.round(share * (known.length - 1))]);
+    const span = high - low || 1;
+    clipped(u, (ctx) => {
+      for (const { band, first, hop, values } of cells.bands) {
+        const [top, bottom] = [band[1], band[0]].map((f) => u.valToPos(f, "y", true));
+        values.forEach((value, i) => {
+          if (value == null) return;
+          const [a, b] = [first + (i - 0.5) * hop, first + (i + 0.5) * hop].map((x) => u.valToPos(x, "x", true));
+          ctx.fillStyle = rampColour((value - low) / span);
+          ctx.fillRect(a, top, b - a + 0.5, bottom - top + 0.5);
+        });
+      }
+    });
+    const { ctx, bbox } = u;
+    const ratio = devicePixelRatio;
+    const [y, height] = [bbox.top - 20 * ratio, 10 * ratio];
+    const width = Math.min(160 * ratio, bbox.width / 3);
+    ctx.save();
+    write(ctx, cells.label, bbox.left, y + height / 2, "left", "middle", colour.ink);
+    const x = bbox.left + ctx.measureText(`${cells.label}  ${number(low)} `).width;
+    write(ctx, number(low), x - 5 * ratio, y + height / 2, "right", "middle", colour.muted);
+    for (let i = 0; i < 64; i++) {
+      ctx.fillStyle = rampColour(i / 63);
+      ctx.fillRect(x + (i * width) / 64, y, width / 64 + 0.5, height);
+    }
+    write(ctx, number(high), x + width + 5 * ratio, y + height / 2, "left", "middle", colour.muted);
+    ctx.restore();
   }
 
   function level(ctx, box, y, style, dash, ratio) {
@@ -341,7 +423,8 @@ const Charts = (() => {
    *   data: [x, y1, y2, ...], null where there is no value
    *   series: [{label, colour, swatch, width, dash, fill, unit, auto, silent}]   colour: a name of COLOURS
    *   intervals: [[upper, lower]] pairs of series (from 1) with the area between them filled
-   *   references, limits: [{value, label}]   marks: [{at, label}]   shades: [{from, to}]
+   *   references, limits: [{value, label}]   marks: [{at, label}]   shades: [{from, to, kind}]
+   *   cells: {label, bands: [{band: [low, high], first, hop, values}]}   coloured areas in place of curves
    * The lists may be changed later; chart.redraw(false, true) shows it. chart.setData(data) for new data. */
   function lines(host, o) {
     if (charts.size === 0) readColours();
@@ -356,8 +439,8 @@ const Charts = (() => {
     const live = (name, unit) => (u, v) => (v == null ? "" : `${number(v)}${unit ? ` ${unit}` : ""}`);
     const options = {
       width: Math.max(host.clientWidth, 200),
-      height: o.height || 220,
-      padding: [8, 10, 0, 0],
+      height: paperHeight(o.height || 220),
+      padding: [o.cells ? 28 : 8, 10, 0, 0],
       scales: { x: xScale, y: { distr: o.y.log ? 3 : 1, range: valueRange(o) } },
       axes: [axis(2, { label: o.x.label, log }), axis(3, { label: o.y.label, log: o.y.log })],
       series: [{ label: o.x.name || "at", value: live("x", o.x.unit) }].concat(
@@ -375,7 +458,11 @@ const Charts = (() => {
         })),
       ),
       bands: (o.intervals || []).map((pair) => ({ series: pair, fill: () => colour.interval })),
-      legend: { live: true, markers: { width: 2, stroke: (u, i) => swatch(o, i), fill: (u, i) => swatch(o, i) } },
+      legend: {
+        show: !o.cells,
+        live: true,
+        markers: { width: 2, stroke: (u, i) => swatch(o, i), fill: (u, i) => swatch(o, i) },
+      },
       cursor: {
         y: false,
         drag: { x: true, y: false, dist: 4 },
@@ -398,7 +485,7 @@ const Charts = (() => {
       },
       hooks: {
         drawClear: [(u) => drawShades(u, o.shades)],
-        drawAxes: [(u) => drawReferences(u, o.references)],
+        drawAxes: [(u) => drawReferences(u, o.references), (u) => o.cells && drawCells(u, o.cells)],
         draw: [
           (u) => {
             drawMarks(u, o.marks);
@@ -415,8 +502,8 @@ const Charts = (() => {
     };
     const u = new uPlot(options, o.data, host);
     const chart = register(u, host, () => {
-      const width = host.clientWidth;
-      if (width > 0 && width !== u.width) u.setSize({ width, height: options.height });
+      const [width, height] = [host.clientWidth, paperHeight(o.height || 220)];
+      if (width > 0 && (width !== u.width || height !== u.height)) u.setSize({ width, height });
     });
     chart.setData = (data) => u.setData(data, !linked);
     chart.linked = linked;

@@ -4,15 +4,28 @@
   const drawing = JSON.parse(document.getElementById("drawing").textContent);
   const decoded = new Map();
 
-  /* A column is {block, type, offset}: little-endian samples in base64, the offset taken off before rounding. */
+  /* A column is {block, type, offset}: little-endian samples in base64, the offset taken off before rounding; "steps" are
+   * from each whole number to the next. */
   function column(spec) {
     if (!spec) return null;
     if (!decoded.has(spec.block)) {
       const text = atob(document.getElementById(spec.block).textContent.trim());
       const bytes = new Uint8Array(text.length);
       for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
-      const raw = new { f4: Float32Array, f8: Float64Array, u4: Uint32Array }[spec.type](bytes.buffer);
-      decoded.set(spec.block, spec.type === "u4" ? raw : Float64Array.from(raw, (v) => v + spec.offset));
+      const types = { f4: Float32Array, f8: Float64Array, u4: Uint32Array, steps: Uint16Array };
+      const raw = new types[spec.type](bytes.buffer);
+      let sum = 0;
+      if (spec.type === "u4") decoded.set(spec.block, raw);
+      else if (spec.type === "steps")
+        decoded.set(
+          spec.block,
+          Uint32Array.from(raw, (v) => (sum += v)),
+        );
+      else
+        decoded.set(
+          spec.block,
+          Float64Array.from(raw, (v) => v + spec.offset),
+        );
     }
     return decoded.get(spec.block);
   }
@@ -50,6 +63,14 @@
       button.addEventListener("click", () => linked.set(...range()));
       bar.append(button);
     }
+  }
+
+  /* Both sides of the limit of |delay|, and the critical delay, which only a lag reaches. */
+  function delayLimits({ delay, critical_delay: critical }) {
+    const format = (v) => `${Charts.short(v)} ms`;
+    const limits = limitPair(delay == null ? null : delay * 1e3, 0, format);
+    if (critical != null) limits.push({ value: critical * 1e3, label: `critical ${format(critical * 1e3)}` });
+    return limits;
   }
 
   function limitPair(limit, around, format) {
@@ -127,7 +148,7 @@
         x: axis,
         y: { label, unit, least },
         height: 190,
-        shades,
+        shades: [...shades, ...a.over[name].map(([from, to]) => ({ from, to, kind: "over" }))],
         limits,
         data: [x, take(key), take(`trusted_${key}`), ...band],
         references: [{ value: name === "delay" ? 0 : 1 }, ...reference(whole, "whole record", factor)],
@@ -146,16 +167,29 @@
       overall[0],
       limitPair(a.limits.amplitude, 1, Charts.short),
     );
-    chart(
-      host("moving-delay"),
-      "delay",
-      "Delay d (ms)",
-      "ms",
-      0.5,
-      1e3,
-      overall[1],
-      limitPair(a.limits.delay == null ? null : a.limits.delay * 1e3, 0, (v) => `${Charts.short(v)} ms`),
-    );
+    chart(host("moving-delay"), "delay", "Delay d (ms)", "ms", 0.5, 1e3, overall[1], delayLimits(a.limits));
+  }
+
+  function drawBoth(a, host, axis) {
+    const both = a.both;
+    if (!both) return;
+    const chart = (name, label, key, factor) =>
+      Charts.lines(host(name), {
+        x: axis,
+        y: { label: "Frequency (Hz)", log: true, fixed: both.extent },
+        height: 210,
+        data: [axis.group.extent, [null, null]],
+        series: [{ label: name, colour: "value" }],
+        cells: {
+          label,
+          bands: both.bands.map((band) => ({
+            ...band,
+            values: band[key].map((v) => (v == null ? null : v * factor)),
+          })),
+        },
+      });
+    chart("both-gain", "Gain (-)", "gain", 1);
+    chart("both-delay", "Delay (ms)", "delay_s", 1e3);
   }
 
   function drawHistories(a, host, axis) {
@@ -224,7 +258,7 @@
       });
       Charts.lines(host("weights"), {
         x: axis,
-        y: { label: "Weight of a bin (-)", zero: true },
+        y: { label: "Weight (-)", zero: true },
         height: 220,
         marks: bare,
         shades,
@@ -285,7 +319,7 @@
       1e3,
       ["delay_s", "delay_low_s", "delay_high_s"],
       [{ value: 0 }, ...reference(a.delay_s, "d", 1e3)],
-      limitPair(a.limits.delay == null ? null : a.limits.delay * 1e3, 0, (v) => `${Charts.short(v)} ms`),
+      delayLimits(a.limits),
     );
     Charts.lines(host("coherence"), {
       x: axis,
@@ -311,6 +345,7 @@
     const a = drawing[number];
     const axis = drawTime(panel, a, host);
     drawMoving(a, host, axis);
+    drawBoth(a, host, axis);
     drawHistories(a, host, axis);
     drawFrequencies(panel, a, host);
     panel.dataset.drawn = "true";
@@ -356,10 +391,54 @@
     });
   });
 
+  /* On paper all panels stand one after another. */
+  addEventListener("beforeprint", () => panels.forEach((_, i) => draw(i)));
+
+  // ------------------------------------------------------------------------------------------------ summary
+
+  const table = document.querySelector(".summary table");
+  const rows = table ? [...table.tBodies[0].rows] : [];
+
+  function sortBy(place, heads) {
+    const keys = new Map(rows.map((row) => [row, row.cells[place].dataset.sort]));
+    const numeric = [...keys.values()].every((key) => key === "" || Number.isFinite(Number(key)));
+    const before = heads[place].getAttribute("aria-sort");
+    /* Of numbers the largest come first, of names the first of the alphabet. */
+    const descending = before ? before === "ascending" : numeric;
+    heads.forEach((head) => head.removeAttribute("aria-sort"));
+    heads[place].setAttribute("aria-sort", descending ? "descending" : "ascending");
+    const compare = numeric ? (a, b) => a - b : (a, b) => a.localeCompare(b, undefined, { numeric: true });
+    rows.sort((one, other) => {
+      const [a, b] = [keys.get(one), keys.get(other)];
+      if (a === "" || b === "") return (a === "") - (b === "");
+      return descending ? compare(b, a) : compare(a, b);
+    });
+    table.tBodies[0].append(...rows);
+  }
+
+  if (table) {
+    const heads = [...table.tHead.rows[0].cells];
+    heads.forEach((head, i) => head.querySelector("button").addEventListener("click", () => sortBy(i, heads)));
+    const field = document.querySelector("[data-filter]");
+    field.addEventListener("input", () => {
+      const words = field.value.toLowerCase().split(/\s+/).filter(Boolean);
+      let shown = 0;
+      for (const row of rows) {
+        const named = [...row.cells].filter((cell) => !cell.classList.contains("number"));
+        const text = named.map((cell) => cell.textContent.toLowerCase()).join(" ");
+        row.hidden = !words.every((word) => text.includes(word));
+        if (!row.hidden) shown++;
+      }
+      document.querySelector("[data-matches]").textContent = `${shown} of ${rows.length}`;
+    });
+  }
+
   function fromAddress() {
     const asked = /^#assessment-(\d+)$/.exec(location.hash);
-    const number = asked ? Number(asked[1]) : 0;
-    return number < panels.length ? number : 0;
+    /* The worst is open first. */
+    const worst = rows.length ? Number(rows[0].dataset.assessment) : 0;
+    const number = asked ? Number(asked[1]) : worst;
+    return number < panels.length ? number : worst;
   }
   addEventListener("hashchange", () => select(fromAddress(), false));
   select(fromAddress(), false);

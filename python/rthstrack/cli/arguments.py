@@ -6,11 +6,12 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rthstrack.cli.quantities import hertz, number, seconds, seconds_from_zero
+from rthstrack.cli.quantities import hertz, number, positive, seconds, seconds_from_zero
 from rthstrack.cli.setting_options import spoken
 from rthstrack.errors import SettingError
 from rthstrack.evaluation.presets import PRESETS
 from rthstrack.units import is_unit
+from rthstrack.verdict.display import FIGURE_IN, PANELS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -201,6 +202,30 @@ def unit(text: str) -> tuple[str, str]:
     if not is_unit(found):
         raise argparse.ArgumentTypeError(f"expected a unit (mm, m, in, V, ms, ...) or CHANNEL=UNIT, found '{text}'")
     return channel, found
+
+
+def panels(text: str) -> tuple[str, ...]:
+    """Names of panels of a figure, in order."""
+    names = tuple(name.strip() for name in text.split(","))
+    for name in names:
+        if name not in PANELS:
+            raise argparse.ArgumentTypeError(f"expected names of {', '.join(PANELS)}, found '{name}'")
+    return names
+
+
+def size(text: str) -> tuple[float, float | None]:
+    """Width and height of a figure in inches; the height is None where it is not stated."""
+    width, _, height = text.lower().partition("x")
+    # 85x120mm: the unit of both.
+    unit = "".join(c for c in height if c.isalpha())
+    sides = [side + unit if side.strip()[-1:].isdigit() else side for side in (width, height) if side.strip()]
+    if not sides or any(side.strip()[-1:].isdigit() for side in sides):
+        raise argparse.ArgumentTypeError(f"expected a width and a height in mm or in (85x120mm, 85mm), found '{text}'")
+    inches = [positive(side, "m") / 0.0254 for side in sides]
+    low, high = FIGURE_IN
+    if any(not low <= side <= high for side in inches):
+        raise argparse.ArgumentTypeError(f"expected sides from {low:g} to {high:g} in, found '{text}'")
+    return inches[0], inches[1] if len(inches) > 1 else None
 
 
 def path(*endings: str) -> Callable[[str], Path]:

@@ -13,8 +13,10 @@ from rthstrack.cli.arguments import (
     add_method,
     add_signals,
     files_in,
+    panels,
     path,
     read_signals,
+    size,
     together,
     told,
     tolerance,
@@ -22,7 +24,7 @@ from rthstrack.cli.arguments import (
 )
 from rthstrack.cli.commands import COMMANDS
 from rthstrack.cli.evaluate_tables import write_tables
-from rthstrack.cli.evaluate_text import SORTED_BY, print_text
+from rthstrack.cli.evaluate_text import print_text
 from rthstrack.cli.progress import counted
 from rthstrack.cli.quantities import positive, seconds
 from rthstrack.cli.setting_options import FACTORS, setting_options, settle, with_auto
@@ -33,9 +35,11 @@ from rthstrack.evaluation.tracking import Evaluator
 from rthstrack.recording.readers import FORMAT_NAMES
 from rthstrack.recording.recording import Recording
 from rthstrack.verdict.assessment import MOVING_S, trusted_settings, without_trusted
+from rthstrack.verdict.display import PANELS
 from rthstrack.verdict.entry import result_entry
 from rthstrack.verdict.limits import EXCEEDED as LIMIT_EXCEEDED
 from rthstrack.verdict.limits import NOT_JUDGED, Limits
+from rthstrack.verdict.order import SORTED_BY
 from rthstrack.verdict.recorded import assess_pair
 
 if TYPE_CHECKING:
@@ -86,9 +90,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     output = parser.add_argument_group("output")
     output.add_argument("--json", action="store_true", help="print JSON instead of text")
     output.add_argument("--report", type=path(".html", ".htm"), metavar="OUT.html", help="write an interactive report")
-    output.add_argument(
-        "--figure", type=path(*_FIGURES), metavar="OUT.png|pdf|svg", help="write a figure for a journal"
-    )
+    output.add_argument("--figure", type=path(*_FIGURES), action="append", default=[], metavar="OUT.png|pdf|svg",
+                        help="write a figure for a journal; repeat for other formats")  # fmt: skip
+    output.add_argument("--panels", type=panels, metavar="NAME,...", help=f"its panels, in order: {', '.join(PANELS)}")
+    output.add_argument("--size", type=size, metavar="WIDTH[xHEIGHT]",
+                        help="of the figure: 85mm, 85x120mm, 7.2x9in (7.2in, as high as the panels need)")  # fmt: skip
     output.add_argument("--csv", type=path(".csv"), metavar="OUT.csv",
                         help="write a row a result, and curves over frequency to OUT_frequency.csv; with --moving also "
                         "the readings, to OUT_moving.csv")  # fmt: skip
@@ -236,10 +242,13 @@ def _check(args: argparse.Namespace, misuse: Callable[[str], Any]) -> None:
         misuse(f"--start must come before --end, found {args.start:g} and {args.end:g}")
     if args.resample and (args.rate):
         misuse("--resample interpolates the file's time stamps and excludes --rate")
+    if not args.figure and (args.panels is not None or args.size is not None):
+        misuse("--panels and --size speak of a figure: give --figure")
     for option in ("report", "figure", "csv"):
-        path = getattr(args, option)
-        if path is not None and not path.parent.is_dir():
-            misuse(f"--{option}: there is no directory {path.parent}")
+        paths = getattr(args, option)
+        for out in paths if isinstance(paths, list) else [paths]:
+            if out is not None and not out.parent.is_dir():
+                misuse(f"--{option}: there is no directory {out.parent}")
 
 
 def _evaluate_all(args: argparse.Namespace) -> tuple[list[list[Assessment]], list[tuple[str, RthstrackError]]]:
@@ -274,21 +283,26 @@ def _write_outputs(args: argparse.Namespace, assessments: Sequence[Assessment]) 
     """Report, figure and CSV; returns what was written, one line each."""
     if not assessments:
         return []
-    notes = []
-    try:
+    notes: list[str] = []
+
+    def write_others() -> None:
         if args.report is not None:
             from rthstrack.report.page import write_report
 
             write_report(assessments, args.report)
             notes.append(f"report written to {args.report}")
-        if args.figure is not None:
-            from rthstrack.plots.assessment import write_figure
-
-            for a, path in _figure_paths(args.figure, assessments):
-                write_figure(a, path)
-                notes.append(f"figure written to {path}")
         if args.csv is not None:
-            notes += write_tables(args.csv, assessments, moving=args.moving is not None)
+            notes.extend(write_tables(args.csv, assessments, moving=args.moving is not None))
+
+    try:
+        if not args.figure:
+            write_others()
+            return notes
+        from rthstrack.plots.page import write_figures
+
+        figures = [one for path in args.figure for one in _figure_paths(path, assessments)]
+        write_figures(figures, panels=args.panels, size_in=args.size, meanwhile=write_others)
+        notes += [f"figure written to {path}" for _, path in figures]
     except OSError as error:
         raise RecordingError(f"cannot write {error.filename}: {error.strerror}") from None
     return notes

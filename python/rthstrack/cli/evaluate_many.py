@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rthstrack.said import coded
-from rthstrack.verdict.display import with_interval
+from rthstrack.verdict.display import shortened, with_interval
 from rthstrack.verdict.limits import CANNOT_BE_JUDGED
+from rthstrack.verdict.order import WORST, in_order
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 
 _OUTCOMES = {None: "", "passed": "pass", "exceeded": "FAIL", "not_judged": "not judged"}
 _STYLES = {None: "", "passed": "green", "exceeded": "bold red", "not_judged": "bold yellow"}
-_WORST = ("exceeded", "not_judged")
 # A name is cut to no less than this.
 _SHORTEST_NAME = 16
 # So many files are named beside a remark.
@@ -57,14 +57,7 @@ def _delay_interval(t: Tracking) -> str:
     return rest.removesuffix(")") if opened else "-"
 
 
-def _largest(a: Assessment) -> float:
-    """The largest |delay| of the windows, s."""
-    import numpy as np
-
-    return math.nan if a.moving is None or not a.moving.valid.any() else float(np.nanmax(np.abs(a.moving.delay_s)))
-
-
-_WORST_WINDOW = _Column("worst window", 2, lambda a: _known(1e3 * _largest(a), ".3f"))
+_WORST_WINDOW = _Column("worst window", 2, lambda a: _known(1e3 * a.largest_delay_s, ".3f"))
 _COLUMNS = (
     _Column("amplitude", 0, lambda a: _amplitude(a.tracking)),
     _Column("delay ms", 0, lambda a: _delay(a.tracking)),
@@ -82,7 +75,7 @@ def print_many(console: Console, assessments: Sequence[Assessment], n_failed: in
     """Prints the table, then what is odd, each kind once, and one closing line where limits were given."""
     from rich.text import Text
 
-    found = _sorted(assessments, sort)
+    found = in_order(assessments, sort)
     names = _names(found)
     columns = [column for column in _COLUMNS if any(column.text(a) != "-" for a in found)]
     if any(a.outcome for a in found):
@@ -105,7 +98,7 @@ def print_many(console: Console, assessments: Sequence[Assessment], n_failed: in
     head = "  ".join([f"{'file':<{room}}", *(f"{column.name:>{widths[column]}}" for column in columns)])
     console.print(Text(head.rstrip(), style="bold"), no_wrap=True)
     for i, (a, name) in enumerate(zip(found, names, strict=True)):
-        line = [f"{_cut(name, room):<{room}}", *(f"{cells[column][i]:>{widths[column]}}" for column in columns)]
+        line = [f"{shortened(name, room):<{room}}", *(f"{cells[column][i]:>{widths[column]}}" for column in columns)]
         console.print(Text("  ".join(line).rstrip(), style=_STYLES[a.outcome]), no_wrap=True)
     _print_remarks(console, found, names)
     print_closing(console, found, names, n_failed)
@@ -117,26 +110,6 @@ def print_closing(console: Console, found: Sequence[Assessment], names: Sequence
 
     if (closing := _closing(found, names, n_failed)) is not None:
         console.print(Text(closing[0], style=_STYLES[closing[1]]))
-
-
-def _sorted(assessments: Sequence[Assessment], sort: str) -> list[Assessment]:
-    def downwards(value: float) -> float:
-        return -math.inf if math.isnan(value) else -value
-
-    def place(a: Assessment) -> tuple[float | str, ...]:
-        error, delay = downwards(a.indices.rms_error_percent), downwards(abs(float(a.tracking.delay_s)))
-        if sort == "file":
-            return (a.file, a.actuator)
-        if sort == "delay":
-            return (delay,)
-        if sort == "amplitude":
-            return (downwards(abs(float(a.tracking.amplitude) - 1)),)
-        if sort == "error":
-            return (error,)
-        rank = _WORST.index(a.outcome) if a.outcome in _WORST else len(_WORST)
-        return (rank, error)
-
-    return list(assessments) if sort == "given" else sorted(assessments, key=place)
 
 
 def _names(assessments: Sequence[Assessment]) -> list[str]:
@@ -160,14 +133,6 @@ def _alike(files: Sequence[str]) -> bool:
     return len({os.path.isabs(file) for file in files}) == 1
 
 
-def _cut(name: str, width: int) -> str:
-    """A name cut in the middle, so that its beginning and its end are seen."""
-    if len(name) <= width:
-        return name
-    first = (width - 3) // 2
-    return f"{name[:first]}...{name[len(name) - (width - 3 - first) :]}"
-
-
 def _print_remarks(console: Console, found: Sequence[Assessment], names: Sequence[str]) -> None:
     """Each kind of warning once, with the files it is of and the words of the first."""
     from rich.text import Text
@@ -187,11 +152,11 @@ def _closing(found: Sequence[Assessment], names: Sequence[str], n_failed: int) -
     counted = Counter(a.outcome for a in found if a.outcome is not None)
     if not counted:
         return None
-    state = next(one for one in (*_WORST, "passed") if counted[one])
+    state = next(one for one in (*WORST, "passed") if counted[one])
     n = sum(counted.values())
     worst, name = next((a, name) for a, name in zip(found, names, strict=True) if a.outcome == state)
     words = {"exceeded": "exceed a limit", "not_judged": "cannot be judged", "passed": "are within the limits"}
-    parts = [f"{counted[one]} of {n + n_failed} {words[one]}" for one in (*_WORST, "passed") if counted[one]]
+    parts = [f"{counted[one]} of {n + n_failed} {words[one]}" for one in (*WORST, "passed") if counted[one]]
     heading = worst.conclusion.partition(": ")[0]
     if n_failed:
         parts.insert(0, f"{n_failed} of {n + n_failed} could not be read")

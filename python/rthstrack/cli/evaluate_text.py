@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from rthstrack.verdict.assessment import Assessment
 
 
-#: What many results may be sorted by.
-SORTED_BY = ("worst", "given", "file", "delay", "amplitude", "error")
-
 _PARTS = {"whole": "", "compensator": "compensator: ", "actuator": "actuator: "}
 _COLOURS = {"passed": "bold green", "exceeded": "bold red", "not_judged": "bold yellow"}
 # In what least squares as asked for may differ from the trusted estimate.

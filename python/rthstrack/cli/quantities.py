@@ -29,7 +29,8 @@ def number(text: str, unit: str = "", expected: str = "a number") -> float:
     size = _size(found[2], unit, text) if found and found[2] else 1.0
     value = size * (float(found[1]) if found else _word(text, expected))
     if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"expected {expected} that is finite, found '{text}'")
+        finite = expected if "finite" in expected else expected.replace("a ", "a finite ", 1)
+        raise argparse.ArgumentTypeError(f"expected {finite}, found '{text}'")
     return value
 
 

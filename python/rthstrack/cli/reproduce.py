@@ -33,7 +33,7 @@ examples:
   rthstrack reproduce -o paper
   rthstrack reproduce -o paper --record MU2035=NORTHR_MU2035.AT2
 
-  rthstrack reproduce -o paper --record CANOGA=c.txt --layout values --rate 100 --unit g
+  rthstrack reproduce --record CANOGA=c.txt --layout values --rate 100 --unit g
 
 Files of the same names in DIR are overwritten, no others.
 Exit status: 0 done, 1 a record cannot be had or read, or a file not be written, 2 misuse.

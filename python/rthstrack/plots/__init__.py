@@ -6,16 +6,16 @@ window opens. Colours are Okabe and Ito's, as on the report's page.
 """
 
 from rthstrack.plots.assessment import (
-    figure,
     plot_error,
     plot_frequency_response,
     plot_indices,
     plot_loop,
     plot_moving,
     plot_spectra,
+    plot_time_frequency,
     plot_time_history,
-    write_figure,
 )
+from rthstrack.plots.page import figure, write_figure, write_figures
 from rthstrack.plots.style import (
     BAND,
     DOUBLE_COLUMN_IN,
@@ -30,6 +30,7 @@ from rthstrack.plots.style import (
     THIRD,
     VALUE,
 )
+from rthstrack.verdict.display import PANELS
 
 __all__ = [
     "BAND",
@@ -39,6 +40,7 @@ __all__ = [
     "LIMIT",
     "MEASURED",
     "MUTED",
+    "PANELS",
     "SECOND",
     "SINGLE_COLUMN_IN",
     "TARGET",
@@ -51,6 +53,8 @@ __all__ = [
     "plot_loop",
     "plot_moving",
     "plot_spectra",
+    "plot_time_frequency",
     "plot_time_history",
     "write_figure",
+    "write_figures",
 ]

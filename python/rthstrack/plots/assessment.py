@@ -11,21 +11,16 @@ Limits then take in all runs, and a target in common is drawn once.
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import matplotlib
-import matplotlib.font_manager
-import matplotlib.ticker
+import matplotlib.cm
+import matplotlib.colors
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from rthstrack.errors import SettingError
 from rthstrack.plots.runs import DASHED, FAINT, Run
 from rthstrack.plots.style import (
     BAND,
-    DOUBLE_COLUMN_IN,
     DOUBTFUL,
     ERROR,
     LIMIT,
@@ -38,6 +33,9 @@ from rthstrack.plots.style import (
     _legend,
     _several,
     _style,
+    drawn,
+    even_ticks,
+    log_ticks,
     shared_label,
     value_range,
 )
@@ -55,8 +53,6 @@ if TYPE_CHECKING:
     from rthstrack.evaluation.response import FrequencyResponse, FrequencySlopes
     from rthstrack.evaluation.tracking import MovingTracking
 
-_FORMATS = ("png", "pdf", "svg")
-
 
 def plot_time_history(
     assessment: Assessment,
@@ -72,8 +68,10 @@ def plot_time_history(
         run = Run(ax, label, color, MEASURED, assessment.unit)
         target_role, measured_role = display.signal_roles(assessment.part)
         time_s, part = _span(assessment, span_s)
-        run.draw_target(time_s, assessment.target[part], target_role, assessment.target[part])
-        (line,) = ax.plot(time_s, assessment.measured[part], color=run.colour, linewidth=0.7)
+        target, measured = assessment.target[part], assessment.measured[part]
+        kept = drawn(target, measured)
+        run.draw_target(time_s[kept], target[kept], target_role, target)
+        (line,) = ax.plot(time_s[kept], measured[kept], color=run.colour, linewidth=0.7)
         run.name(line, measured_role)
         ax.set_ylabel(_label(display.quantity(assessment.unit), assessment.unit))
         _time_axis(ax, run, time_s)
@@ -97,7 +95,9 @@ def plot_error(
         time_s, part = _span(assessment, span_s)
         if run.first:
             ax.axhline(0, color=MUTED, linewidth=0.5)
-        (line,) = ax.plot(time_s, assessment.measured[part] - assessment.target[part], color=run.colour)
+        error = assessment.measured[part] - assessment.target[part]
+        kept = drawn(error)
+        (line,) = ax.plot(time_s[kept], error[kept], color=run.colour)
         run.name(line, "", f"{measured_role} \N{MINUS SIGN} {target_role}")
         ax.set_ylabel(_label("Error", assessment.unit))
         _time_axis(ax, run, time_s)
@@ -136,7 +136,8 @@ def plot_loop(
         ax.set_aspect("equal", adjustable="box")
         ax.set_xlabel(_label(target_role.capitalize(), assessment.unit))
         ax.set_ylabel(_label(measured_role.capitalize(), assessment.unit))
-        _few_ticks(ax)
+        even_ticks(ax, "x")
+        even_ticks(ax, "y")
         if not run.alone:
             _legend(ax, columns=2)
     return ax
@@ -169,8 +170,10 @@ def plot_spectra(
         inside = (frequency >= shown[0]) & (frequency <= shown[1])
         if run.first:
             _weights(ax, frequency, weights, 1.15 * float(weights[inside].max(initial=0.0)) or 1.0)
-        run.draw_target(frequency, target, target_role, t.target_spectrum, logarithmic=True)
-        (line,) = ax.loglog(frequency, measured, color=run.colour, linewidth=0.7)
+        ax.set_xscale("log")
+        ax.set_yscale("log")
+        run.draw_target(frequency, target, target_role, t.target_spectrum)
+        (line,) = ax.plot(frequency, measured, color=run.colour, linewidth=0.7)
         run.name(line, measured_role)
         _frequency_axis(ax, run, *shown)
         peak = max(target[inside].max(initial=0.0), measured[inside].max(initial=0.0))
@@ -178,6 +181,7 @@ def plot_spectra(
         if peak > 0:
             ax.set_ylim(max(low, 1e-6 * peak) / 1.5, peak * 4)
         run.keep_y(before)
+        log_ticks(ax, "y")
         _mark_equivalent_frequency(ax, assessment, run)
         ax.set_ylabel(_label("Fourier amplitude", f"{assessment.unit} s" if assessment.unit else None))
         _legend(ax, columns=2)
@@ -231,14 +235,16 @@ def plot_frequency_response(
             if its.first:
                 axis.axhline(ideal, color=MUTED, linewidth=0.5)
             axis.fill_between(frequency, interval[:, 0], interval[:, 1], color=run.colour, alpha=BAND, linewidth=0)
-            axis.semilogx(frequency, values, **faint)
-            (line,) = axis.semilogx(frequency, np.where(sure, values, np.nan), color=run.colour, linewidth=1)
+            axis.set_xscale("log")
+            axis.plot(frequency, values, **faint)
+            (line,) = axis.plot(frequency, np.where(sure, values, np.nan), color=run.colour, linewidth=1)
             its.name(line, "")
             relied_on = values[sure & in_view]
             value_range(axis, its.with_earlier(relied_on if relied_on.size else values[in_view]), ideal, least)
         for coherence_axis in ax[2:]:
-            coherence_axis.semilogx(frequency, coherence, **faint)
-            coherence_axis.semilogx(frequency, np.where(sure, coherence, np.nan), color=run.colour, linewidth=1)
+            coherence_axis.set_xscale("log")
+            coherence_axis.plot(frequency, coherence, **faint)
+            coherence_axis.plot(frequency, np.where(sure, coherence, np.nan), color=run.colour, linewidth=1)
             coherence_axis.axhline(display.DRAWN_GREY_BELOW, color=MUTED, linewidth=0.5, linestyle=(0, (1, 2)))
             coherence_axis.set_ylim(0, 1.05)
             coherence_axis.set_ylabel("Coherence (-)")
@@ -249,8 +255,9 @@ def plot_frequency_response(
         delay_axis.set_ylabel("Delay (ms)")
         for axis, its in zip(ax, runs, strict=True):
             _frequency_axis(axis, its, low, high)
+            even_ticks(axis, "y")
             if isinstance(result, Assessment):
-                _mark_equivalent_frequency(axis, result, its, labelled=axis is gain_axis)
+                _mark_equivalent_frequency(axis, result, its, labelled=False)
         if not alone:
             _legend(gain_axis, columns=3)
         shared_label(ax, "Frequency (Hz)")
@@ -267,8 +274,8 @@ def plot_moving(
     """A(t) and d(t) (ms) of moving windows, at their centres, on two axes; gaps where nothing could be determined.
 
     An assessment gives the trusted estimate with its 95 % intervals as a band beside the published or the one asked
-    for, its limits (dashed) and the whole record's trusted A and d (dotted). With `label` or `color`, and
-    of further runs, the trusted estimate alone.
+    for, its limits (dashed), when they were exceeded (shaded) and the whole record's trusted A and d (dotted). With
+    `label` or `color`, and of further runs, the trusted estimate alone.
     """
     with _style():
         ax = _several(ax, 2, 2.8)
@@ -318,6 +325,10 @@ def plot_moving(
             amplitude_axis.axhline(float(whole.amplitude), **dotted)
             delay_axis.axhline(float(whole.delay_s) * 1e3, **dotted)
             _limit_lines(amplitude_axis, delay_axis, runs, assessment.limits)
+            over = assessment.over_limit_s()
+            for axis, name in ((amplitude_axis, "amplitude"), (delay_axis, "delay")):
+                for first, last in over[name]:
+                    axis.axvspan(first, last, color=LIMIT, alpha=0.15, linewidth=0)
         amplitude_axis.set_ylabel("A (-)")
         delay_axis.set_ylabel("d (ms)")
         for its in runs:
@@ -325,6 +336,9 @@ def plot_moving(
                 its.show_x(assessment.start_s, assessment.start_s + assessment.target.size / assessment.rate_hz)
             elif time_s.size > 1:
                 its.show_x(time_s[0], time_s[-1])
+        for axis in ax:
+            even_ticks(axis, "x")
+            even_ticks(axis, "y")
         shared_label(ax, "Time (s)")
     return ax
 
@@ -345,9 +359,10 @@ def plot_indices(
         beside: Any = {"color": THIRD} if alone else {"color": run.colour, "linestyle": DASHED}
         h = assessment.histories
         time_s = assessment.start_s + np.arange(h.rms_error.size) / h.rate_hz
-        (line,) = error_axis.plot(time_s, h.max_tracking_error, color=run.colour)
+        kept = drawn(h.max_tracking_error, h.rms_error, h.tracking_indicator)
+        (line,) = error_axis.plot(time_s[kept], h.max_tracking_error[kept], color=run.colour)
         run.name(line, "MTE")
-        (line,) = error_axis.plot(time_s, h.rms_error, **beside)
+        (line,) = error_axis.plot(time_s[kept], h.rms_error[kept], **beside)
         run.name(line, "RMS")
         error_axis.autoscale(axis="y")
         error_axis.set_ylim(bottom=0)
@@ -355,7 +370,7 @@ def plot_indices(
         _legend(error_axis, columns=2)
         if run.first:
             indicator_axis.axhline(0, color=MUTED, linewidth=0.5)
-        indicator_axis.plot(time_s, h.tracking_indicator, color=SECOND if alone else run.colour)
+        indicator_axis.plot(time_s[kept], h.tracking_indicator[kept], color=SECOND if alone else run.colour)
         indicator_axis.set_ylabel(_label("TI", f"{assessment.unit}²" if assessment.unit else None))
         for axis, its in zip(ax, runs, strict=True):
             _time_axis(axis, its, time_s)
@@ -363,49 +378,46 @@ def plot_indices(
     return ax
 
 
-def figure(assessment: Assessment) -> Figure:
-    """One figure, two columns wide: histories, their strongest 4 s, loop, spectra, A and d over time and frequency."""
-    with _style():
-        page = Figure(figsize=(DOUBLE_COLUMN_IN, 8.2), layout=ConstrainedLayoutEngine(w_pad=0.05, h_pad=0.05))
-        # Grids within a grid: columns of one width for all rows would have no room for the labels between them.
-        rows = page.add_gridspec(4, 1, height_ratios=(1.1, 1.7, 1.7, 2.6))
-        enlarged, curves = rows[1].subgridspec(1, 5), rows[3].subgridspec(2, 2)
-        first, end = display.strongest_span(assessment.target, assessment.rate_hz)
-        strongest = (
-            assessment.start_s + first / assessment.rate_hz,
-            assessment.start_s + (end - 1) / assessment.rate_hz,
-        )
-        history = plot_time_history(assessment, ax=page.add_subplot(rows[0]))
-        history.axvspan(*strongest, color="#000000", alpha=0.08, linewidth=0)
-        zoomed = plot_time_history(assessment, ax=page.add_subplot(enlarged[:3]), span_s=strongest)
-        loop = plot_loop(assessment, ax=page.add_subplot(enlarged[3:]), span_s=strongest)
-        spectra = plot_spectra(assessment, ax=page.add_subplot(rows[2]))
-        moving = [page.add_subplot(curves[row, 0]) for row in (0, 1)]
-        plot_moving(assessment, ax=moving)
-        response = [page.add_subplot(curves[row, 1]) for row in (0, 1)]
-        plot_frequency_response(assessment, ax=response)
-        for axis, letter in zip((history, zoomed, loop, spectra, *moving, *response), "abcdefgh", strict=True):
-            axis.set_title(f"({letter})", loc="left", fontweight="bold", pad=3)
-    return page
+def plot_time_frequency(
+    assessment: Assessment, *, ax: Sequence[Axes] | NDArray[Any] | None = None
+) -> Sequence[Axes] | NDArray[Any]:
+    """Gain and delay (ms) over time and frequency on two axes, in half octaves; empty where the coherence is low.
 
-
-def write_figure(assessment: Assessment, path: str | Path) -> None:
-    """Write `figure(assessment)` as PNG (600 dpi), PDF or SVG, by the ending of `path`.
-
-    Errors: SettingError where the ending is another, or the file cannot be written.
+    Drawn only where they change with both; else the axes say so.
     """
-    ending = Path(path).suffix.lower().removeprefix(".")
-    if ending not in _FORMATS:
-        found = f"ends in .{ending}" if ending else "has no ending"
-        raise SettingError(f"{path}: a figure is written as .png, .pdf or .svg, this name {found}; choose one of these")
-    page = figure(assessment)
-    try:
-        with _style():
-            page.savefig(path, format=ending)
-    except OSError as error:
-        raise SettingError(
-            f"{path}: cannot write the figure there ({error.strerror}); name a file in an existing, writable folder"
-        ) from error
+    with _style():
+        ax = _several(ax, 2, 3.6)
+        found = assessment.time_frequency()
+        if found is None:
+            for one in ax:
+                _note(one, "gain and delay do not change with both time and frequency")
+            return ax
+        low, high = found.bands[0].low_hz, found.bands[-1].high_hz
+        for axis, name, factor, label in ((ax[0], "gain", 1.0, "Gain (-)"), (ax[1], "delay_s", 1e3, "Delay (ms)")):
+            rows = [factor * values for values in found.known(name)]
+            # One odd cell is not to take the contrast of the others.
+            ends = np.nanquantile(np.concatenate(rows), (0.02, 0.98))
+            norm = matplotlib.colors.Normalize(*ends)
+            for band, values in zip(found.bands, rows, strict=True):
+                centres = assessment.start_s + band.time_s
+                edges = np.append(centres - band.hop_s / 2, centres[-1] + band.hop_s / 2)
+                axis.pcolormesh(edges, [band.low_hz, band.high_hz], values[np.newaxis], cmap="cividis", norm=norm)
+            axis.set_yscale("log")
+            axis.set_ylim(low, high)
+            axis.set_xlim(assessment.start_s, assessment.start_s + assessment.target.size / assessment.rate_hz)
+            log_ticks(axis, "y")
+            even_ticks(axis, "x")
+            axis.set_ylabel("Frequency (Hz)")
+            axis.set_xlabel("Time (s)")
+            # Above the axes, where it takes no width from the time.
+            bar = axis.inset_axes((0.6, 1.06, 0.27, 0.05))
+            colours = matplotlib.cm.ScalarMappable(norm=norm, cmap="cividis")
+            scale = axis.figure.colorbar(colours, cax=bar, orientation="horizontal", ticks=[])
+            scale.outline.set_visible(False)
+            for at, value, side in ((-0.03, ends[0], "right"), (1.03, ends[1], "left")):
+                bar.text(at, 0.5, display.significant(float(value), 3), transform=bar.transAxes, ha=side, va="center")
+            bar.text(-0.5, 0.5, label, transform=bar.transAxes, ha="right", va="center")
+    return ax
 
 
 def _label(name: str, unit: str | None) -> str:
@@ -431,6 +443,8 @@ def _span(assessment: Assessment, span_s: tuple[float, float] | None) -> tuple[N
 def _time_axis(ax: Axes, run: Run, time_s: NDArray[np.float64]) -> None:
     run.show_x(time_s[0], time_s[-1])
     ax.set_xlabel("Time (s)")
+    even_ticks(ax, "x")
+    even_ticks(ax, "y")
 
 
 def _weights(ax: Axes, frequency: NDArray[np.float64], weights: NDArray[np.float64], top: float) -> None:
@@ -438,29 +452,21 @@ def _weights(ax: Axes, frequency: NDArray[np.float64], weights: NDArray[np.float
     weight_axis = ax.twinx()
     weight_axis.fill_between(frequency, weights, color=SECOND, alpha=0.3, linewidth=0)
     weight_axis.set_ylim(0, top)
-    weight_axis.set_ylabel("Weight of a bin (-)", color=SECOND)
+    weight_axis.set_ylabel("Weight (-)", color=SECOND)
     weight_axis.tick_params(axis="y", colors=SECOND)
     weight_axis.spines["right"].set_visible(True)
     weight_axis.spines["right"].set_color(SECOND)
+    even_ticks(weight_axis, "y")
     # The curves belong in front of the weights, although the weights' axis was added later.
     ax.set_zorder(weight_axis.get_zorder() + 1)
     ax.patch.set_visible(False)
 
 
 def _frequency_axis(ax: Axes, run: Run, low: float, high: float) -> None:
-    """A logarithmic axis whose labels are plain numbers: 1 2 5 over a few decades, whole decades over more."""
+    """A logarithmic axis whose labels are plain numbers."""
     run.show_x(low, high)
-    low, high = ax.get_xlim()
-    few = high < 300 * low
-    ax.xaxis.set_major_locator(matplotlib.ticker.LogLocator(subs=(1, 2, 5) if few else (1,)))
-    ax.xaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(lambda value, _: f"{value:g}"))
-    ax.xaxis.set_minor_formatter(matplotlib.ticker.NullFormatter())
+    log_ticks(ax, "x")
     ax.set_xlabel("Frequency (Hz)")
-
-
-def _few_ticks(ax: Axes) -> None:
-    for axis in (ax.xaxis, ax.yaxis):
-        axis.set_major_locator(matplotlib.ticker.MaxNLocator(5, steps=[1, 2, 5, 10]))
 
 
 def _slope_lines(gain_axis: Axes, delay_axis: Axes, slopes: FrequencySlopes | None, colour: ColorType) -> None:
@@ -501,17 +507,21 @@ def _ms(seconds: float | None) -> float | None:
 def _mark_equivalent_frequency(ax: Axes, assessment: Assessment, run: Run, labelled: bool = True) -> None:
     f_eq = float(assessment.tracking.equivalent_frequency_hz)
     known = run.marks("f_eq")
-    if not np.isfinite(f_eq) or f_eq in known:
+    low, high = ax.get_xlim()
+    # Text has no axes to be cut off by.
+    if not low < f_eq < high or f_eq in known:
         return
     known.append(f_eq)
     ax.axvline(f_eq, color=MUTED if run.alone else run.colour, linewidth=0.7, linestyle=(0, (4, 3)))
     if labelled and run.first:
+        right = f_eq**2 > low * high
         ax.annotate(
-            r"$f_\mathrm{eq}$",
+            f"f_eq {display.significant(f_eq, 3)} Hz",
             (f_eq, 1),
             xycoords=("data", "axes fraction"),
-            xytext=(3, -2),
+            xytext=(-3 if right else 3, -2),
             textcoords="offset points",
+            ha="right" if right else "left",
             va="top",
             color=MUTED,
         )

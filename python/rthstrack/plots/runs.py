@@ -85,8 +85,6 @@ class Run:
         y: NDArray[np.float64],
         role: str,
         target: NDArray[Any],
-        *,
-        logarithmic: bool = False,
     ) -> None:
         """The target's curve, once where runs have one `target` in common."""
         for known, line in self._on.targets:
@@ -95,7 +93,7 @@ class Run:
                 return
         how: dict[str, Any] = {"color": TARGET} if self.first else {"color": self.colour}
         how |= {} if self.first else {"linestyle": DASHED, "linewidth": 0.7}
-        (line,) = (self._ax.loglog if logarithmic else self._ax.plot)(x, y, **how)
+        (line,) = self._ax.plot(x, y, **how)
         self.name(line, role)
         self._on.targets.append((target, line))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import threading
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rthstrack.errors import SettingError
+from rthstrack.verdict import display
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -97,6 +99,65 @@ def _several(ax: Sequence[Axes] | NDArray[Any] | None, n: int, height_in: float)
     if shape != (n,):
         raise SettingError(f"this plot needs {n} axes in a row, ax has the shape {shape}; pass a sequence of {n} axes")
     return ax
+
+
+#: A line of more points than this is drawn by the extremes of so many groups: no print shows more.
+DRAWN_SAMPLES, DRAWN_GROUPS = 20_000, 2_000
+# Every axis has so many ticks; an inch has room for so many, across and up.
+FEWEST_TICKS = 3
+_TICKS_PER_IN = (2.0, 3.5)
+
+
+def drawn(*columns: NDArray[np.float64]) -> NDArray[np.intp] | slice:
+    """Which points of lines over time are drawn: all, or the extremes of groups of them."""
+    if columns[0].size <= DRAWN_SAMPLES:
+        return slice(None)
+    return display.extremes(columns, display.even_edges(columns[0].size, DRAWN_GROUPS))
+
+
+def _room(ax: Axes, which: str) -> int:
+    """For how many ticks an axis has room."""
+    length = ax.bbox.width if which == "x" else ax.bbox.height
+    per_in = _TICKS_PER_IN[which == "y"]
+    return max(FEWEST_TICKS, round(per_in * length / ax.figure.dpi))
+
+
+def even_ticks(ax: Axes, which: str) -> None:
+    """Ticks at steps of 1, 2 or 5, as many as there is room for, and three at least."""
+    axis = ax.xaxis if which == "x" else ax.yaxis
+    steps = [1, 2, 5, 10]
+    locator = matplotlib.ticker.MaxNLocator(_room(ax, which), steps=steps, min_n_ticks=FEWEST_TICKS)
+    axis.set_major_locator(locator)
+
+
+def log_ticks(ax: Axes, which: str) -> None:
+    """Ticks of a logarithmic axis whose range is set: 1 2 5, 1 3 or whole decades by the room, and three at least."""
+    axis = ax.xaxis if which == "x" else ax.yaxis
+    low, high = sorted(axis.get_view_interval())
+    room = _room(ax, which)
+    ticks: list[float] = []
+    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    stride = max(1, math.ceil(math.log10(high / low) / room))
+    for leads, every in (((1, 2, 5), 1), ((1, 3), 1), ((1,), 1), ((1,), stride)):
+        ticks = [lead * 10.0**power for power in powers for lead in leads if power % every == 0]
+        ticks = [tick for tick in ticks if low * (1 - 1e-9) <= tick <= high * (1 + 1e-9)]
+        if len(ticks) <= 1.6 * room:
+            break
+    if len(ticks) < FEWEST_TICKS:
+        even = matplotlib.ticker.MaxNLocator(room, steps=[1, 2, 5, 10], min_n_ticks=FEWEST_TICKS)
+        ticks = [float(tick) for tick in even.tick_values(low, high) if low <= tick <= high and tick > 0]
+    axis.set_major_locator(matplotlib.ticker.FixedLocator(ticks))
+    axis.set_major_formatter(matplotlib.ticker.FuncFormatter(lambda value, _: power_of_ten(value)))
+    axis.set_minor_locator(matplotlib.ticker.NullLocator())
+
+
+def power_of_ten(value: float) -> str:
+    """A tick's number: plain, or a power of ten where that is shorter."""
+    if 1e-3 <= value < 1e5:
+        return f"{value:g}"
+    power = math.floor(math.log10(value) + 1e-9)
+    lead = round(value / 10.0**power)
+    return f"{'' if lead == 1 else f'{lead}×'}10{str(power).translate(display.SUPERSCRIPTS)}"
 
 
 def _legend(ax: Axes, columns: int = 1) -> None:

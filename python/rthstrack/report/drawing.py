@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,10 +21,30 @@ if TYPE_CHECKING:
     from rthstrack.evaluation.tracking import MovingTracking
     from rthstrack.verdict.assessment import Assessment
 
-#: More samples than this are drawn by their extremes.
-DRAWN_SAMPLES = 200_000
-#: More points of a curve (spectrum, history, moving evaluation) than this are drawn by their extremes.
-DRAWN_POINTS = 6_000
+#: More samples than this are drawn by their extremes: of one record, and of several in one report together.
+DRAWN_SAMPLES, DRAWN_SAMPLES_OF_ALL = 200_000, 120_000
+#: More points of a curve (spectrum, history, moving evaluation) than this, likewise.
+DRAWN_POINTS, DRAWN_POINTS_OF_ALL = 6_000, 20_000
+#: No record is drawn by fewer.
+FEWEST_SAMPLES, FEWEST_POINTS = 3_000, 500
+
+
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """How many samples of a record, and how many points of a curve, are drawn."""
+
+    samples: int
+    points: int
+
+    @classmethod
+    def of(cls, n_records: int) -> Budget:
+        """What each of so many records may have, so that a report of many stays small."""
+        if n_records == 1:
+            return cls(DRAWN_SAMPLES, DRAWN_POINTS)
+        return cls(
+            max(DRAWN_SAMPLES_OF_ALL // n_records, FEWEST_SAMPLES),
+            min(max(DRAWN_POINTS_OF_ALL // n_records, FEWEST_POINTS), DRAWN_POINTS),
+        )
 
 
 class Blocks:
@@ -35,6 +56,10 @@ class Blocks:
     def column(self, values: NDArray[Any]) -> dict[str, Any]:
         """Store a column in single precision, of the distance from mid-range where that is far from zero."""
         if values.dtype.kind in "iu":
+            # Indices rise: from one to the next is a small number.
+            steps = np.diff(values, prepend=0)
+            if steps.size and steps.min() >= 0 and steps.max() < 1 << 16:
+                return self._store(steps.astype("<u2"), "steps", 0.0)
             return self._store(values.astype("<u4"), "u4", 0.0)
         finite = values[np.isfinite(values)]
         low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
@@ -54,20 +79,39 @@ class Blocks:
         return "\n".join(f'<script type="text/plain" id="{key}">{text}</script>' for key, text in self._texts.items())
 
 
-def _kept_samples(a: Assessment) -> NDArray[np.intp] | None:
-    """The samples drawn, or None for all of them; six extremes a group make at most DRAWN_SAMPLES."""
-    if a.target.size <= DRAWN_SAMPLES:
+def drawings(assessments: Sequence[Assessment], blocks: Blocks) -> list[dict[str, Any]]:
+    """What the page draws of each assessment; the parts of one test keep the same samples, so that they share them."""
+    records: dict[tuple[Any, ...], list[Assessment]] = {}
+    for a in assessments:
+        records.setdefault(_record(a), []).append(a)
+    budget = Budget.of(len(records))
+    kept = {record: _kept_samples(parts, budget) for record, parts in records.items()}
+    return [_drawing(a, blocks, budget, kept[_record(a)]) for a in assessments]
+
+
+def _record(a: Assessment) -> tuple[Any, ...]:
+    """What the parts of one test have in common."""
+    return a.file, a.actuator, a.start_s, a.rate_hz, a.target.size, None if a.file else id(a)
+
+
+def _kept_samples(parts: Sequence[Assessment], budget: Budget) -> NDArray[np.intp] | None:
+    """The samples drawn of one record, or None for all of them: the extremes of each channel and error in groups."""
+    n = parts[0].target.size
+    if n <= budget.samples:
         return None
-    columns = (a.target, a.measured, a.measured - a.target)
-    return display.extremes(columns, display.even_edges(a.target.size, DRAWN_SAMPLES // 6))
+    channels = {id(column): column for a in parts for column in (a.target, a.measured)}
+    columns = [*channels.values(), *(a.measured - a.target for a in parts)]
+    return display.extremes(columns, display.even_edges(n, max(budget.samples // (2 * len(columns)), 1)))
 
 
-def _kept_points(columns: Sequence[NDArray[np.float64]], logarithmic: bool = False) -> NDArray[np.intp] | None:
+def _kept_points(
+    columns: Sequence[NDArray[np.float64]], budget: Budget, logarithmic: bool = False
+) -> NDArray[np.intp] | None:
     n = columns[0].size
-    if n <= DRAWN_POINTS:
+    if n <= budget.points:
         return None
     # On a logarithmic axis the groups at low frequencies are single bins, and most curves peak together.
-    edges = display.log_edges(n, DRAWN_POINTS // 2) if logarithmic else display.even_edges(n, DRAWN_POINTS // 6)
+    edges = display.log_edges(n, budget.points // 2) if logarithmic else display.even_edges(n, budget.points // 6)
     return display.extremes(columns, edges)
 
 
@@ -75,7 +119,7 @@ def _take(values: NDArray[Any], kept: NDArray[np.intp] | None) -> NDArray[Any]:
     return values if kept is None else values[kept]
 
 
-def _drawing(a: Assessment, blocks: Blocks) -> dict[str, Any]:
+def _drawing(a: Assessment, blocks: Blocks, budget: Budget, kept: NDArray[np.intp] | None) -> dict[str, Any]:
     drawing = {
         "unit": a.unit or "",
         "amplitude": a.tracking.amplitude,
@@ -84,11 +128,13 @@ def _drawing(a: Assessment, blocks: Blocks) -> dict[str, Any]:
         "trusted_delay_s": a.trusted.delay_s,
         "equivalent_frequency_hz": a.tracking.equivalent_frequency_hz,
         "limits": {gate.name: gate.limit for gate in a.gates},
-        "time": _time_drawing(a, blocks),
-        "histories": _histories_drawing(a, blocks),
-        "moving": _moving_drawing(a, blocks),
-        "spectrum": _spectrum_drawing(a, blocks),
-        "response": _response_drawing(a, blocks),
+        "over": a.over_limit_s(),
+        "time": _time_drawing(a, blocks, kept),
+        "histories": _histories_drawing(a, blocks, budget),
+        "moving": _moving_drawing(a, blocks, budget),
+        "spectrum": _spectrum_drawing(a, blocks, budget),
+        "response": _response_drawing(a, blocks, budget),
+        "both": _both_drawing(a),
         "frequency": _frequency_drawing(a),
     }
     plain = json_ready(drawing)
@@ -96,10 +142,9 @@ def _drawing(a: Assessment, blocks: Blocks) -> dict[str, Any]:
     return plain
 
 
-def _time_drawing(a: Assessment, blocks: Blocks) -> dict[str, Any]:
+def _time_drawing(a: Assessment, blocks: Blocks, kept: NDArray[np.intp] | None) -> dict[str, Any]:
     target_role, measured_role = display.signal_roles(a.part)
     target_label, measured_label = _signal(target_role, a.target_name), _signal(measured_role, a.measured_name)
-    kept = _kept_samples(a)
     first, end = display.strongest_span(a.target, a.rate_hz)
     whole = end - first == a.target.size
     return {
@@ -126,7 +171,7 @@ def _signal(role: str, name: str) -> str:
     return role if name.lower() == role else f"{role}: {name}"
 
 
-def _histories_drawing(a: Assessment, blocks: Blocks) -> dict[str, Any]:
+def _histories_drawing(a: Assessment, blocks: Blocks, budget: Budget) -> dict[str, Any]:
     h = a.histories
     columns = {
         "max_tracking_error": h.max_tracking_error,
@@ -135,7 +180,7 @@ def _histories_drawing(a: Assessment, blocks: Blocks) -> dict[str, Any]:
     }
     if h.energy_error is not None:
         columns["energy_error"] = h.energy_error
-    kept = _kept_points(list(columns.values()))
+    kept = _kept_points(list(columns.values()), budget)
     n = h.rms_error.size
     return {
         "start": a.start_s,
@@ -149,14 +194,14 @@ def _histories_drawing(a: Assessment, blocks: Blocks) -> dict[str, Any]:
     }
 
 
-def _moving_drawing(a: Assessment, blocks: Blocks) -> dict[str, Any] | None:
+def _moving_drawing(a: Assessment, blocks: Blocks, budget: Budget) -> dict[str, Any] | None:
     m = a.beside_moving
     if m is None or m.time_s.size == 0:
         return None
     columns = {"amplitude": np.where(m.valid, m.amplitude, np.nan), "delay_s": np.where(m.valid, m.delay_s, np.nan)}
     if a.trusted_moving is not None:
         columns |= _trusted_columns(a.trusted_moving)
-    kept = _kept_points(list(columns.values()))
+    kept = _kept_points(list(columns.values()), budget)
     edges = np.flatnonzero(np.diff(np.concatenate(([True], m.valid, [True])).astype(np.int8)))
     half = m.hop_s / 2
     invalid = [
@@ -185,13 +230,13 @@ def _trusted_columns(m: MovingTracking) -> dict[str, NDArray[np.float64]]:
     }
 
 
-def _spectrum_drawing(a: Assessment, blocks: Blocks) -> dict[str, Any] | None:
+def _spectrum_drawing(a: Assessment, blocks: Blocks, budget: Budget) -> dict[str, Any] | None:
     t = a.tracking
     if t.frequency_hz is None or t.weights is None or t.target_spectrum is None or t.measured_spectrum is None:
         return None
     scale = display.fourier_scale(t)
     target, measured = np.abs(t.target_spectrum) * scale, np.abs(t.measured_spectrum) * scale
-    kept = _kept_points([target, measured, t.weights], logarithmic=True)
+    kept = _kept_points([target, measured, t.weights], budget, logarithmic=True)
     return {
         "n": t.frequency_hz.size,
         "drawn": t.frequency_hz.size if kept is None else kept.size,
@@ -204,7 +249,7 @@ def _spectrum_drawing(a: Assessment, blocks: Blocks) -> dict[str, Any] | None:
     }
 
 
-def _response_drawing(a: Assessment, blocks: Blocks) -> dict[str, Any] | None:
+def _response_drawing(a: Assessment, blocks: Blocks, budget: Budget) -> dict[str, Any] | None:
     r = a.response
     if r is None:
         return None
@@ -224,7 +269,7 @@ def _response_drawing(a: Assessment, blocks: Blocks) -> dict[str, Any] | None:
             ("delay_high_s", r.delay_interval_s[:, 1]),
         )
     }
-    kept = _kept_points(list(columns.values()), logarithmic=True)
+    kept = _kept_points(list(columns.values()), budget, logarithmic=True)
     return {
         "n": frequency.size,
         "drawn": frequency.size if kept is None else kept.size,
@@ -244,6 +289,33 @@ def _slope_lines(s: FrequencySlopes | None) -> dict[str, Any] | None:
         "at": s.equivalent_frequency_hz,
         "gain": [s.gain, s.gain_per_hz],
         "delay_s": [s.delay_s, s.delay_s_per_hz],
+    }
+
+
+def _both_drawing(a: Assessment) -> dict[str, Any] | None:
+    """Gain and delay over time and frequency, to four digits: colours show no more."""
+    found = a.time_frequency()
+    if found is None:
+        return None
+
+    def rounded(values: NDArray[np.float64]) -> list[float]:
+        return [float(f"{value:.4g}") for value in values]
+
+    rows = zip(found.bands, found.known("gain"), found.known("delay_s"), strict=True)
+    return {
+        "extent": [found.bands[0].low_hz, found.bands[-1].high_hz],
+        "least_coherence": found.least_coherence,
+        "window_s": [found.bands[-1].window_s, found.bands[0].window_s],
+        "bands": [
+            {
+                "band": [band.low_hz, band.high_hz],
+                "first": a.start_s + float(band.time_s[0]),
+                "hop": band.hop_s,
+                "gain": rounded(gain),
+                "delay_s": rounded(delay_s),
+            }
+            for band, gain, delay_s in rows
+        ],
     }
 
 

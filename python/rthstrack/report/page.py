@@ -9,6 +9,8 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import re
+from collections import Counter
 from datetime import datetime
 from html import escape
 from pathlib import Path
@@ -19,22 +21,24 @@ import numpy as np
 from rthstrack._core import __version__
 from rthstrack.assets import asset, digest
 from rthstrack.errors import SettingError
-from rthstrack.report.drawing import Blocks, _drawing, _signal
+from rthstrack.report.drawing import Blocks, _signal, drawings
 from rthstrack.report.record import NOT_DETERMINED, _reasons, _why, result_record
 from rthstrack.report.written import _interval, _number, _setting, flat
 from rthstrack.verdict import display
 from rthstrack.verdict.assessment import Assessment
+from rthstrack.verdict.order import in_order
 from rthstrack.verdict.sentence import reason
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
 
 def write_report(assessments: Assessment | Sequence[Assessment], path: str | Path) -> None:
     """Write the HTML report of one or several assessments to `path`.
 
-    Above 200,000 samples a trace is drawn by the extremes of groups of samples, and the page says so; its numbers are
-    the assessment's own. Errors: SettingError without an assessment, or where the file cannot be written.
+    Above 200,000 samples a trace is drawn by the extremes of groups of samples, and the page says so; several records
+    share 120,000. The page's numbers are the assessments' own. Errors: SettingError without an assessment, or where the
+    file cannot be written.
     """
     page = report_html(assessments)
     try:
@@ -52,7 +56,7 @@ def report_html(assessments: Assessment | Sequence[Assessment]) -> str:
     if not assessments:
         raise SettingError("a report needs at least one assessment, none was given; evaluate a recording first")
     blocks = Blocks()
-    drawing = [_drawing(assessment, blocks) for assessment in assessments]
+    drawing = drawings(assessments, blocks)
     version, created = __version__, datetime.now().astimezone()
     results = {
         "program": {"name": "rthstrack", "version": version},
@@ -67,12 +71,7 @@ def report_html(assessments: Assessment | Sequence[Assessment]) -> str:
         f"script-src {' '.join(digest(script) for script in scripts)}; base-uri 'none'; form-action 'none'"
     )
     several = len(assessments) > 1
-    n_files = len({assessment.file for assessment in assessments})
-    title = (
-        f"Tracking of {len(assessments)} pairs in {n_files} {'file' if n_files == 1 else 'files'}"
-        if several
-        else f"Tracking in {_source(assessments[0])}"
-    )
+    title = _title(assessments)
     parts = [
         "<!DOCTYPE html>",
         '<html lang="en">',
@@ -115,6 +114,42 @@ def report_html(assessments: Assessment | Sequence[Assessment]) -> str:
     return "\n".join(parts)
 
 
+_WORDS = {
+    "exceeded": ("exceeds a limit", "exceed a limit"),
+    "not_judged": ("cannot be judged", "cannot be judged"),
+    "passed": ("is within the limits", "are within the limits"),
+}
+_HEADS = {"exceeded": "FAIL", "not_judged": "CANNOT BE JUDGED", "passed": "PASS"}
+
+
+def _title(assessments: Sequence[Assessment]) -> str:
+    """What became of the limits where there are some, and the judged numbers: of one pair, or the range of several."""
+    outcomes = Counter(a.outcome for a in assessments if a.outcome is not None)
+    worst = next((state for state in _WORDS if outcomes[state]), None)
+    opening = "" if worst is None else f"{_HEADS[worst]} \N{MIDDLE DOT} "
+    amplitude, delay = (
+        _range([factor * float(getattr(a.tracking, name)) for a in assessments], unit)
+        for name, factor, unit in (("amplitude", 1.0, ""), ("delay_s", 1e3, " ms"))
+    )
+    numbers = f"delay {delay}, amplitude {amplitude}"
+    if len(assessments) == 1:
+        return f"{opening}{Path(_source(assessments[0])).name}: {numbers}"
+    n_files = len({a.file for a in assessments})
+    what = f"{len(assessments)} pairs in {n_files} {'file' if n_files == 1 else 'files'}"
+    told = ", ".join(
+        f"{outcomes[state]} {words[outcomes[state] > 1]}" for state, words in _WORDS.items() if outcomes[state]
+    )
+    return f"{opening}{what}: {told or numbers}"
+
+
+def _range(values: Sequence[float], unit: str) -> str:
+    known = [value for value in values if math.isfinite(value)]
+    if not known:
+        return NOT_DETERMINED
+    ends = dict.fromkeys(display.significant(value) for value in (min(known), max(known)))
+    return f"{' to '.join(ends)}{unit}"
+
+
 def _json_block(name: str, content: Any) -> str:
     """A JSON script block. With every < written as an escape, no text in it can end the block or open another."""
     text = json.dumps(content, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
@@ -122,6 +157,7 @@ def _json_block(name: str, content: Any) -> str:
 
 
 _OUTCOMES = {
+    None: "",
     "passed": "within limits",
     "exceeded": '<strong class="exceeded">limit exceeded</strong>',
     "not_judged": '<strong class="not_judged">cannot be judged</strong>',
@@ -133,65 +169,151 @@ def _source(a: Assessment) -> str:
     return a.file or "samples given in Python"
 
 
-def _name(a: Assessment, several_files: bool = True) -> str:
-    parts = [Path(_source(a)).name] if several_files else []
-    parts.append(f"actuator {a.actuator_number} ({a.actuator_name})")
+# A tab's name of a file is cut to this, in the middle; table and heading have it whole.
+_TAB_NAME = 28
+
+
+def _name(a: Assessment, several_files: bool, several_actuators: bool) -> str:
+    parts = [display.shortened(Path(_source(a)).name, _TAB_NAME)] if several_files else []
+    if several_actuators or not several_files:
+        parts.append(f"actuator {a.actuator_number} ({a.actuator_name})")
     if a.part != "whole":
         parts.append(a.part)
     return " · ".join(parts)
 
 
+def _always(_: Sequence[Assessment]) -> bool:
+    return True
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class _Column:
+    """A column of the summary: what a row says, what it is sorted by, and of which assessments it says something."""
+
+    head: str
+    html: Callable[[Assessment], str]
+    key: Callable[[Assessment], float | str]
+    is_shown: Callable[[Sequence[Assessment]], bool] = _always
+    is_number: bool = True
+    css: str = ""
+
+
+def _number_column(
+    head: str,
+    field: str,
+    of: Callable[[Assessment], float],
+    factor: float = 1.0,
+    is_shown: Callable[[Sequence[Assessment]], bool] = _always,
+    css: str = "",
+) -> _Column:
+    return _Column(head, lambda a: _number(field, of(a), factor=factor), of, is_shown, css=css)
+
+
+def _between(a: Assessment) -> str:
+    t = a.tracking
+    text = _interval("delay_interval_s", t.delay_interval_s, float(t.delay_s), factor=1e3)
+    return text.removeprefix("95 %: ") or "none"
+
+
+def _width(a: Assessment) -> float:
+    return float(a.tracking.delay_interval_s[1] - a.tracking.delay_interval_s[0])
+
+
+def _differs(key: Callable[[Assessment], Any]) -> Callable[[Sequence[Assessment]], bool]:
+    """Whether it is not the same in all rows."""
+    return lambda found: len({key(a) for a in found}) > 1
+
+
+_OUTCOME_ORDER = {"exceeded": 0.0, "not_judged": 1.0, "passed": 2.0, None: 3.0}
+_COLUMNS = (
+    _Column("Outcome", lambda a: _OUTCOMES[a.outcome], lambda a: _OUTCOME_ORDER[a.outcome],
+            lambda found: any(a.outcome for a in found), is_number=False),
+    _Column("Actuator", lambda a: f"{a.actuator_number} {escape(a.actuator_name)}", lambda a: a.actuator,
+            _differs(lambda a: a.actuator), is_number=False),
+    _Column("Part", lambda a: escape(a.part), lambda a: a.part, _differs(lambda a: a.part), is_number=False),
+    _number_column("Amplitude", "amplitude", lambda a: float(a.tracking.amplitude)),
+    _number_column("Delay (ms)", "delay_s", lambda a: float(a.tracking.delay_s), 1e3),
+    _Column("95 % interval", _between, _width, lambda found: any(math.isfinite(_width(a)) for a in found),
+            css="between"),
+    _number_column("Worst window (ms)", "worst_window_delay_s", lambda a: a.largest_delay_s, 1e3,
+                   lambda found: any(a.moving is not None for a in found)),
+    # What stands beside the judged estimate, where that is another.
+    _number_column("Trusted delay (ms)", "trusted_delay_s", lambda a: float(a.trusted.delay_s), 1e3,
+                   lambda found: any(a.tracking is not a.trusted for a in found)),
+    _number_column("Published delay (ms)", "published_delay_s", lambda a: float(a.published.delay_s), 1e3,
+                   lambda found: any(a.tracking is not a.published for a in found)),
+    _number_column("At (Hz)", "equivalent_frequency_hz", lambda a: float(a.tracking.equivalent_frequency_hz),
+                   css="minor"),
+    _number_column("RMS error (%)", "rms_error_percent", lambda a: a.indices.rms_error_percent),
+    _Column("Signals", lambda a: f"{escape(a.target_name)} → {escape(a.measured_name)}", lambda a: a.target_name,
+            _differs(lambda a: (a.target_name, a.measured_name)), is_number=False, css="minor"),
+    _Column("Warnings", lambda a: str(len(a.warnings) or ""), lambda a: len(a.warnings),
+            lambda found: any(a.warnings for a in found), css="minor"),
+)  # fmt: skip
+
+
 def _summary(assessments: Sequence[Assessment]) -> str:
-    """The table of all, one row per assessment."""
-    heads = (
-        "File",
-        "Actuator",
-        "Part",
-        "Pair",
-        "Amplitude",
-        "Delay (ms)",
-        "f_eq (Hz)",
-        "RMS error (%)",
-    )
-    rows = []
+    """The table of all, one row an assessment, the worst first; its heads sort it, its field filters it."""
+    columns = [column for column in _COLUMNS if column.is_shown(assessments)]
+    places: dict[int, list[int]] = {}
     for number, a in enumerate(assessments):
-        t = a.tracking
-        state = []
-        if a.outcome is not None:
-            state.append(_OUTCOMES[a.outcome])
-        if a.warnings:
-            state.append(f"{len(a.warnings)} {'warning' if len(a.warnings) == 1 else 'warnings'}")
-        numbers = (
-            _number("amplitude", float(t.amplitude)),
-            _number("delay_s", float(t.delay_s), factor=1e3),
-            _number("equivalent_frequency_hz", float(t.equivalent_frequency_hz)),
-            _number("rms_error_percent", a.indices.rms_error_percent),
+        places.setdefault(id(a), []).append(number)
+    names = _short_names(assessments)
+    rows = []
+    for a in in_order(assessments):
+        number = places[id(a)].pop(0)
+        cells = "".join(
+            f'<td class="{"number" if column.is_number else ""} {column.css}" {_sort_key(column.key(a))}>'
+            f"{column.html(a)}</td>"
+            for column in columns
         )
         rows.append(
-            f'<tr data-assessment="{number}">'
-            f'<th scope="row"><a href="#assessment-{number}">{escape(_source(a))}</a></th>'
-            f"<td>{a.actuator_number}</td><td>{escape(a.part)}</td>"
-            f'<td class="pair">{escape(a.target_name)} → {escape(a.measured_name)}</td>'
-            + "".join(f'<td class="number">{text}</td>' for text in numbers)
-            + f"<td>{', '.join(state)}</td></tr>"
+            f'<tr data-assessment="{number}"><th scope="row" {_sort_key(names[number])} title="{escape(_source(a))}">'
+            f'<a href="#assessment-{number}">{_breakable(names[number])}</a></th>{cells}</tr>'
         )
-    head = "".join(
-        f'<th scope="col"{" class=number" if at >= 4 else ""}>{escape(text)}</th>' for at, text in enumerate(heads)
-    )
+    heads = "".join(
+        f'<th scope="col" class="{css}"><button type="button">{escape(text)}</button></th>'
+        for text, css in (
+            ("File", ""), *((column.head, f"{'number' if column.is_number else ''} {column.css}") for column in columns)
+        )
+    )  # fmt: skip
     return (
-        '<section class="summary"><h2>Summary</h2><div class="scroll"><table>'
-        f'<thead><tr>{head}<th scope="col">Remarks</th></tr></thead>'
-        f"<tbody>{''.join(rows)}</tbody></table></div></section>"
+        '<section class="summary"><div class="head"><h2>Summary</h2>'
+        '<label>Search <input type="search" data-filter aria-controls="summary-rows"></label>'
+        f'<output data-matches>{len(rows)} of {len(rows)}</output></div><div class="scroll"><table>'
+        f"<caption>Worst first: limits that were not kept, then the largest error. A head sorts.</caption>"
+        f'<thead><tr>{heads}</tr></thead><tbody id="summary-rows">{"".join(rows)}</tbody></table></div></section>'
     )
+
+
+def _sort_key(value: float | str) -> str:
+    """What a cell is sorted by; a number that is not determined comes last either way."""
+    if isinstance(value, str):
+        return f'data-sort="{escape(value)}"'
+    return f'data-sort="{float(value)!r}"' if math.isfinite(value) else 'data-sort=""'
+
+
+def _short_names(assessments: Sequence[Assessment]) -> list[str]:
+    """The files without the folder that all are in."""
+    files = [_source(a) for a in assessments]
+    folders = {str(Path(file).parent) for file in files}
+    return [Path(file).name for file in files] if len(folders) == 1 else files
+
+
+def _breakable(name: str) -> str:
+    """A name that may go on in the next line behind its signs, rather than be cut."""
+    return re.sub(r"([_\-./\\])", r"\1<wbr>", escape(name))
 
 
 def _tabs(assessments: Sequence[Assessment]) -> str:
     several_files = len({a.file for a in assessments}) > 1
+    several_actuators = len({(a.file, a.actuator) for a in assessments}) > len({a.file for a in assessments})
     tabs = "".join(
         f'<button type="button" role="tab" id="tab-{number}" aria-controls="assessment-{number}" '
-        f'aria-selected="{str(number == 0).lower()}" tabindex="{0 if number == 0 else -1}">'
+        f'aria-selected="{str(number == 0).lower()}" tabindex="{0 if number == 0 else -1}" '
+        f'title="{escape(_source(a))}">'
         f"{'<span class=mark aria-label=&quot;limit exceeded&quot;>▲</span> ' if a.exceeded else ''}"
-        f"{escape(_name(a, several_files))}</button>"
+        f"{escape(_name(a, several_files, several_actuators))}</button>"
         for number, a in enumerate(assessments)
     )
     return f'<div class="tabs" role="tablist" aria-label="Evaluated pairs">{tabs}</div>'
@@ -366,10 +488,14 @@ def _time_charts(a: Assessment, drawing: Mapping[str, Any]) -> str:
             f"{target_role} moves too little in the window (standard deviation below {m.minimum_std_ratio:.3g} of the "
             "record's)."
         )
+        if any(drawing["over"].values()):
+            text += " Orange: over a limit, by the whole interval."
         moving = _chart("moving-amplitude", "Amplitude over time")
         moving += _chart(
             "moving-delay", "Delay over time", text + _trusted_windows(a) + _thinned(drawing["moving"], "windows")
         )
+    if drawing["both"] is not None:
+        moving += _both_charts(drawing["both"])
     histories = drawing["histories"]
     energy = _chart("energy", "Energy error over time") if "energy_error" in histories else ""
     note = _thinned(histories, "samples")
@@ -390,6 +516,18 @@ def _time_charts(a: Assessment, drawing: Mapping[str, Any]) -> str:
         + _chart("running-errors", "Largest error and RMS error so far")
         + _chart("indicator", "Tracking indicator over time", f"TI rises while {measured_role} lags.{note}")
         + f"{energy}</div></div></section>"
+    )
+
+
+def _both_charts(both: Mapping[str, Any]) -> str:
+    first, last = both["window_s"]
+    text = (
+        "Gain and delay change over time and frequency: Welch's method in half octaves, on windows of "
+        f"{first:.3g} s (high frequencies) to {last:.3g} s (low ones), drawn at their centres. Empty: coherence below "
+        f"{both['least_coherence']:g}, or no window."
+    )
+    return _chart("both-gain", "Gain over time and frequency") + _chart(
+        "both-delay", "Delay over time and frequency", text
     )
 
 

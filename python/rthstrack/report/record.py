@@ -24,9 +24,8 @@ NOT_DETERMINED = "not determined"
 def result_record(assessment: Assessment) -> dict[str, Any]:
     """The numbers of one assessment at full precision, ready for JSON; a number that is not determined is None."""
     a = assessment
-    record = result_entry(a)
     # The page draws the curves.
-    del record["frequency_response"]
+    record = result_entry(a, curves=False)
     record |= {
         "part": a.part,
         "start_s": a.start_s,

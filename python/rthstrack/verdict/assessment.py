@@ -17,12 +17,13 @@ from rthstrack.evaluation.indices import index_histories, indices
 from rthstrack.evaluation.inputs import _number, _single, settled
 from rthstrack.evaluation.response import frequency_response, frequency_slopes
 from rthstrack.evaluation.settings import Settings
+from rthstrack.evaluation.time_frequency import TimeFrequency, time_frequency
 from rthstrack.evaluation.tracking import Evaluator, bridged, evaluate_moving
 from rthstrack.said import coded, failed
 from rthstrack.values import Shown, Value
 from rthstrack.verdict.argument import argument as argued
 from rthstrack.verdict.difference import differ
-from rthstrack.verdict.display import signal_roles
+from rthstrack.verdict.display import DRAWN_GREY_BELOW, signal_roles
 from rthstrack.verdict.limits import EXCEEDED, NOT_JUDGED, Limits, conclusion, gates, outcome
 from rthstrack.verdict.sentence import _undetermined, no_motion, reason, sentence, still_in_band, with_cause
 from rthstrack.verdict.warnings import OF_PUBLISHED
@@ -48,6 +49,8 @@ if TYPE_CHECKING:
 MOVING_S = 4.0
 #: Readings a window's length.
 READINGS_PER_WINDOW = 16
+# Of the variation frequency and time must each explain so much, for a picture over both to say something.
+_BOTH = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -149,6 +152,42 @@ class Assessment(Value):
         rows += [("", self.argument)] + ([("limits", self.conclusion)] if self.conclusion else [])
         rows += [("warnings", ", ".join(one.code for one in map(coded, self.warnings)))] if self.warnings else []
         return Shown(f"Assessment: {self.verdict}", rows)
+
+    @property
+    def largest_delay_s(self) -> float:
+        """The largest |delay| of the moving windows."""
+        moving = self.moving
+        return math.nan if moving is None or not moving.valid.any() else float(abs(moving.delay_s[moving.valid]).max())
+
+    def over_limit_s(self) -> dict[str, list[tuple[float, float]]]:
+        """From when to when windows exceed a limit of "amplitude" or of "delay", each window as wide as one hop."""
+        half = 0.0 if self.moving is None else self.moving.hop_s / 2
+        over: dict[str, list[tuple[float, float]]] = {"amplitude": [], "delay": []}
+        for gate in self.gates:
+            spans = over["amplitude" if gate.name == "amplitude" else "delay"]
+            spans += [(first - half, last + half) for first, last in gate.over_s]
+        return over
+
+    def time_frequency(self) -> TimeFrequency | None:
+        """Gain and delay over time and frequency, computed at each call; None where they do not change with both."""
+        d = self.dependence
+        if d is None or self.response is None or self.slopes is None:
+            return None
+        if min(d.shares["frequency"], max(d.shares["time"], d.shares["clock"])) < _BOTH:
+            return None
+        t, m = self.target, self.measured
+        if self.trusted.bad_samples:
+            t, m = bridged(t, m, self.rate_hz, self.trusted)
+        found = time_frequency(
+            t,
+            m,
+            self.rate_hz,
+            self.slopes.band_hz,
+            align_s=self.response.align_s,
+            dispersion=self.response.dispersion,
+            least_coherence=DRAWN_GREY_BELOW,
+        )
+        return found if found is not None and found.changes_with_both else None
 
 
 def assess_samples(

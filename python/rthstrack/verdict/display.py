@@ -26,6 +26,13 @@ DRAWN_GREY_BELOW = 0.8
 #: The part of a record that is shown enlarged, in seconds.
 STRONGEST_S = 4.0
 
+#: The panels of a figure.
+PANELS = (
+    "history", "strongest", "loop", "error", "spectra", "moving", "response", "indices", "time-frequency",
+)  # fmt: skip
+#: Shortest and longest side of a figure, in inches: less has no room for labels.
+FIGURE_IN = (1.5, 50.0)
+
 #: Every estimator, and what it is called beside the others.
 ESTIMATORS = {"fei": "published", "aligned": "aligned", "least_squares": "least squares"}
 
@@ -43,7 +50,7 @@ INDICES = (
 )  # fmt: skip
 
 _ROLES = {"whole": ("target", "measured"), "compensator": ("target", "command"), "actuator": ("command", "measured")}
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def estimator_in_full(name: str) -> str:
@@ -78,7 +85,15 @@ def significant(value: float, digits: int = 4) -> str:
     if -4 <= power < 6:
         return f"{value:.{max(digits - 1 - power, 0)}f}".replace("-", "\N{MINUS SIGN}")
     mantissa = mantissa.replace("-", "\N{MINUS SIGN}")
-    return f"{mantissa}\N{MULTIPLICATION SIGN}10{str(power).translate(_SUPERSCRIPTS)}"
+    return f"{mantissa}\N{MULTIPLICATION SIGN}10{str(power).translate(SUPERSCRIPTS)}"
+
+
+def shortened(name: str, width: int) -> str:
+    """A name cut in the middle, so that its beginning and its end are seen."""
+    if len(name) <= width:
+        return name
+    first = (width - 3) // 2
+    return f"{name[:first]}...{name[len(name) - (width - 3 - first) :]}"
 
 
 def reasons(moving: MovingTracking) -> list[tuple[int, str]]:

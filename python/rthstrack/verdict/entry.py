@@ -20,8 +20,11 @@ if TYPE_CHECKING:
     from rthstrack.verdict.assessment import Assessment
 
 
-def result_entry(a: Assessment) -> dict[str, Any]:
-    """One result as `rthstrack evaluate --json` prints it: numbers at full precision, None where not determined."""
+def result_entry(a: Assessment, *, curves: bool = True) -> dict[str, Any]:
+    """One result as `rthstrack evaluate --json` prints it: numbers at full precision, None where not determined.
+
+    curves: with those over time and frequency.
+    """
     t, moving = a.tracking, a.moving
     warnings = (*a.warnings, *a.exceeded, *a.not_judged)
     entry: dict[str, Any] = {
@@ -59,11 +62,13 @@ def result_entry(a: Assessment) -> dict[str, Any]:
         "loop": None if a.loop is None else a.loop.to_dict(),
         "warnings": warnings,
         "warning_codes": [{"code": said.code, "values": said.values} for said in map(coded, warnings)],
-        "moving": None if moving is None else {name: getattr(moving, name) for name in _MOVING},
+        "moving": None if moving is None or not curves else {name: getattr(moving, name) for name in _MOVING},
         "moving_note": a.moving_note,
-        "frequency_response": None if a.response is None else _curves(a.response),
+        "frequency_response": None if a.response is None or not curves else _curves(a.response),
         "frequency_response_note": a.response_note,
     }
+    if not curves:
+        del entry["moving"], entry["frequency_response"]
     return {key: json_ready(value) for key, value in entry.items()}
 
 
