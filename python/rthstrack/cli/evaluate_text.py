@@ -6,7 +6,7 @@ import math
 import os
 from typing import TYPE_CHECKING
 
-from rthstrack.cli.evaluate_many import print_many
+from rthstrack.values import quantile
 from rthstrack.verdict import display
 from rthstrack.verdict.display import with_interval
 from rthstrack.verdict.sentence import reason
@@ -39,6 +39,8 @@ def print_text(results: Sequence[Sequence[Assessment]], n_files: int, sort: str)
         for a in found:
             _print_one(console, a, several=several)
     elif found:
+        from rthstrack.cli.evaluate_many import print_many
+
         # A table is as wide as it is told to be, in a pipe too.
         print_many(Console(width=None) if "COLUMNS" in os.environ else console, found, sort)
 
@@ -136,7 +138,7 @@ def _windows_text(a: Assessment, moving: MovingTracking) -> str:
     if not known.any():
         return f"no window could be judged{_most_frequent(moving)}"
     delays, amplitudes = 1e3 * moving.delay_s[known], moving.amplitude[known]
-    (low, high), (small, large) = np.quantile(delays, (0.1, 0.9)), np.quantile(amplitudes, (0.1, 0.9))
+    (low, high), (small, large) = ([quantile(one, share) for share in (0.1, 0.9)] for one in (delays, amplitudes))
     return (
         f"of {moving.window_s:g} s{_moving_factors(a, moving)}: delay {low:.4g} to {high:.4g} ms, "
         f"amplitude {small:.4g} to {large:.4g} (10 to 90 % of {known.sum()} readings)"
