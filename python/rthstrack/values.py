@@ -6,7 +6,6 @@ import math
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
-from html import escape
 from importlib import import_module
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -60,6 +59,8 @@ class Value:
 
     def _repr_html_(self) -> str:
         """The same as a table, which a notebook shows."""
+        from html import escape
+
         heading, rows = self._shown()
         few, left = _few(rows)
         if left:

@@ -25,7 +25,7 @@ from rthstrack.cli.progress import counted
 from rthstrack.cli.quantities import positive, seconds
 from rthstrack.cli.setting_options import FACTORS, setting_options, settle, with_auto
 from rthstrack.errors import RecordingError, RthstrackError, SettingError
-from rthstrack.evaluation.factors import TOLERANCE
+from rthstrack.evaluation.inputs import TOLERANCE
 from rthstrack.evaluation.tracking import Evaluator
 from rthstrack.recording.readers import FORMAT_NAMES
 from rthstrack.recording.recording import Recording

@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from rthstrack.errors import SettingError, SignalError
 from rthstrack.evaluation.dependence import dependence
-from rthstrack.evaluation.factors import TOLERANCE, choose_factors
 from rthstrack.evaluation.indices import index_histories, indices
-from rthstrack.evaluation.inputs import _number, _single, settled
+from rthstrack.evaluation.inputs import TOLERANCE, _number, _single, settled
 from rthstrack.evaluation.response import frequency_response, frequency_slopes
 from rthstrack.evaluation.settings import Settings
 from rthstrack.evaluation.tracking import Evaluator, bridged, evaluate_moving
@@ -459,6 +458,8 @@ def _chosen(
     choose: Collection[str],
     tolerance: float,
 ) -> Factors:
+    from rthstrack.evaluation.factors import choose_factors
+
     if unknown := [name for name in choose if name not in ("P", "Q")]:
         raise SettingError(f"choose takes P and Q, not {unknown[0]!r}")
     p, q = settings.data_decimation, settings.frequency_decimation
