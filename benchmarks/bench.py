@@ -21,6 +21,7 @@ import numpy as np
 import scipy
 import scipy.fft
 
+import command
 import rthstrack
 from rthstrack import evaluate
 from rthstrack.errors import UnstableError
@@ -229,7 +230,7 @@ def machine() -> str:
 
 def main() -> int:
     """Measures, prints, writes docs/benchmarks.md; returns 0 whether or not every figure is met."""
-    suite_s = suite()
+    suite_s, command_figures = suite(), command.figures()
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     lengths = [24577, 51160, 92161]
@@ -355,6 +356,7 @@ def main() -> int:
     lines += monitor_table(online)
     figures += monitor_figures(online)
     figures += start_figures(start_ratios())
+    figures += command_figures
     gain = suite_s[1] / suite_s[2]
     figures.append(
         (

@@ -37,6 +37,28 @@ def test_a_csv_is_evaluated_without_scipy_figures_and_readers_of_other_formats()
     assert not loaded("evaluate", str(EXAMPLE), "--json") & set(HEAVY)
 
 
+def test_a_csv_is_evaluated_without_what_its_verdict_does_not_need() -> None:
+    code = (
+        "import sys\nfrom rthstrack.cli import main\nmain(sys.argv[1:])\n"
+        "print('LOADED', *(name for name in sys.argv.pop().split() if name in sys.modules))"
+    )
+    spared = (
+        "rich",
+        "numpy.ma",
+        "difflib",
+        "html",
+        "json",
+        "zipfile",
+        "rthstrack.evaluation.factors",
+        "rthstrack.recording.readers.at2",
+    )
+    code = code.replace("sys.argv.pop()", repr(" ".join(spared)))
+    run = subprocess.run(
+        [sys.executable, "-c", code, "evaluate", str(EXAMPLE)], check=True, capture_output=True, text=True
+    )
+    assert run.stdout.splitlines()[-1] == "LOADED"
+
+
 def test_importing_the_package_loads_nothing_until_a_name_is_used() -> None:
     code = (
         "import sys, rthstrack\nfirst = 'numpy' in sys.modules\n"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 import re
 import typing
@@ -124,6 +123,8 @@ def shown(value: Any) -> str:
 
 def suggestion(name: str, known: Iterable[str]) -> str:
     """What may have been meant, as the end of a message; nothing where nothing is like it."""
+    import difflib  # nobody waits for it where nothing is wrong
+
     near = difflib.get_close_matches(name, [one for one in known if one != name], n=2, cutoff=0.5)
     return f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
 

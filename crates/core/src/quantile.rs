@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 /// Beyond as many degrees of freedom the expansion about the normal distribution is exact to 1e-9.
 const LARGE: f64 = 60.0;
 /// 0.975 quantile of the normal distribution.
-const NORMAL: f64 = 1.959_963_984_540_054;
+pub(crate) const NORMAL: f64 = 1.959_963_984_540_054;
 
 /// The 0.975 quantile of Student's t with `dof` >= 1 degrees of freedom, not necessarily whole; relative error below 1e-8.
 ///

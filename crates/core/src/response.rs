@@ -31,7 +31,7 @@ use num_complex::Complex;
 use crate::error::{Error, Result};
 use crate::evaluator::Evaluator;
 use crate::pair::Pair;
-use crate::quantile::student_t_975;
+use crate::quantile::{NORMAL, student_t_975};
 use crate::reason::Reason;
 use crate::settings::EvaluatorConfig;
 use crate::spectrum::{Bins, Sink, Spectrum, SpectrumConfig, SpectrumState};
@@ -563,8 +563,8 @@ impl Noise {
     /// Whether bin k has an interval, see [`FrequencyResponse`].
     pub(crate) fn supported(&self, k: usize, gain: f64) -> Option<Supported> {
         let std = (self.variance(k, self.power[k]) / 2.0).sqrt();
-        // NaN is refused too.
-        if !(self.degrees[k] >= MIN_DEGREES && std.is_finite()) {
+        // NaN is refused too. Most bins hold nothing, and t, which is dear, is never below the normal quantile.
+        if !(self.degrees[k] >= MIN_DEGREES && NORMAL * std < LINEAR * gain) {
             return None;
         }
         let t = student_t_975(self.degrees[k]);

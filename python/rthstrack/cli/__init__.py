@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from importlib import import_module
 from typing import TYPE_CHECKING
+
+# Before NumPy is loaded: its products here are of a few rows, and the threads that BLAS keeps for large ones wait by
+# spinning, which costs a core more than they save.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from rthstrack._core import __version__
 from rthstrack.cli.commands import COMMANDS
@@ -14,6 +19,7 @@ from rthstrack.errors import ConfigurationError, RthstrackError, SettingError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from types import ModuleType
 
 INTERRUPTED, BROKEN_PIPE = 130, 141
 
@@ -45,7 +51,7 @@ def _run(words: Sequence[str]) -> int:
     asked = next((word for word in words if not word.startswith("-")), None)
     for name, line in COMMANDS.items():
         if name == asked:
-            import_module(f"{__name__}.{name}").add_parser(subparsers)
+            _loaded(name).add_parser(subparsers)
         else:
             subparsers.add_parser(name, help=line)
     args = parser.parse_args(words)
@@ -63,3 +69,15 @@ def _run(words: Sequence[str]) -> int:
             print(subparsers.choices[asked].hint(), file=sys.stderr)
         return MISUSE
     return status
+
+
+def _loaded(name: str) -> ModuleType:
+    """A command's module. What is loaded stays, so that nothing of it is looked through for garbage, then or later."""
+    collected = gc.isenabled()
+    gc.disable()
+    try:
+        return import_module(f"{__name__}.{name}")
+    finally:
+        if collected:
+            gc.freeze()
+            gc.enable()

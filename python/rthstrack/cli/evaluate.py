@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 from pathlib import Path
@@ -23,20 +22,17 @@ from rthstrack.cli.arguments import (
     two_files,
 )
 from rthstrack.cli.commands import COMMANDS
-from rthstrack.cli.evaluate_tables import write_tables
 from rthstrack.cli.evaluate_text import print_text
 from rthstrack.cli.progress import counted
 from rthstrack.cli.quantities import positive, seconds
 from rthstrack.cli.setting_options import FACTORS, setting_options, settle, with_auto
 from rthstrack.errors import RecordingError, RthstrackError, SettingError
-from rthstrack.evaluation.factors import TOLERANCE
-from rthstrack.evaluation.results import json_ready
+from rthstrack.evaluation.inputs import TOLERANCE
 from rthstrack.evaluation.tracking import Evaluator
 from rthstrack.recording.readers import FORMAT_NAMES
 from rthstrack.recording.recording import Recording
 from rthstrack.verdict.assessment import MOVING_S, trusted_settings, without_trusted
 from rthstrack.verdict.display import PANELS
-from rthstrack.verdict.entry import result_entry
 from rthstrack.verdict.limits import EXCEEDED as LIMIT_EXCEEDED
 from rthstrack.verdict.limits import NOT_JUDGED, Limits
 from rthstrack.verdict.order import SORTED_BY
@@ -117,6 +113,11 @@ def run(args: argparse.Namespace, misuse: Callable[[str], Any]) -> int:
     assessments = [a for found in results for a in found]
     notes = _write_outputs(args, assessments)
     if args.json:
+        import json
+
+        from rthstrack.evaluation.results import json_ready
+        from rthstrack.verdict.entry import result_entry
+
         document = {
             "results": [result_entry(a) for a in assessments],
             "failures": [
@@ -292,6 +293,8 @@ def _write_outputs(args: argparse.Namespace, assessments: Sequence[Assessment]) 
             write_report(assessments, args.report)
             notes.append(f"report written to {args.report}")
         if args.csv is not None:
+            from rthstrack.cli.evaluate_tables import write_tables
+
             notes.extend(write_tables(args.csv, assessments, moving=args.moving is not None))
 
     try:

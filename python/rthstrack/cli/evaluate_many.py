@@ -17,8 +17,7 @@ from rthstrack.verdict.order import WORST, in_order
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from rich.console import Console
-
+    from rthstrack.cli.lines import Lines
     from rthstrack.evaluation.tracking import Tracking
     from rthstrack.verdict.assessment import Assessment
 
@@ -71,10 +70,8 @@ _COLUMNS = (
 )
 
 
-def print_many(console: Console, assessments: Sequence[Assessment], n_failed: int, sort: str) -> None:
+def print_many(out: Lines, assessments: Sequence[Assessment], n_failed: int, sort: str) -> None:
     """Prints the table, then what is odd, each kind once, and one closing line where limits were given."""
-    from rich.text import Text
-
     found = in_order(assessments, sort)
     names = _names(found)
     columns = [column for column in _COLUMNS if any(column.text(a) != "-" for a in found)]
@@ -90,26 +87,24 @@ def print_many(console: Console, assessments: Sequence[Assessment], n_failed: in
     def width(shown: Sequence[_Column]) -> int:
         return sum(widths[column] + 2 for column in shown)
 
-    while width(columns) + min(longest, _SHORTEST_NAME) > console.width or (
-        width(columns) + longest > console.width and max(column.rank for column in columns)
+    while width(columns) + min(longest, _SHORTEST_NAME) > out.width or (
+        width(columns) + longest > out.width and max(column.rank for column in columns)
     ):
         columns.remove(max(columns, key=lambda column: column.rank))
-    room = max(_SHORTEST_NAME, min(longest, console.width - width(columns)))
+    room = max(_SHORTEST_NAME, min(longest, out.width - width(columns)))
     head = "  ".join([f"{'file':<{room}}", *(f"{column.name:>{widths[column]}}" for column in columns)])
-    console.print(Text(head.rstrip(), style="bold"), no_wrap=True)
+    out.line((head.rstrip(), "bold"))
     for i, (a, name) in enumerate(zip(found, names, strict=True)):
         line = [f"{shortened(name, room):<{room}}", *(f"{cells[column][i]:>{widths[column]}}" for column in columns)]
-        console.print(Text("  ".join(line).rstrip(), style=_STYLES[a.outcome]), no_wrap=True)
-    _print_remarks(console, found, names)
-    print_closing(console, found, names, n_failed)
+        out.line(("  ".join(line).rstrip(), _STYLES[a.outcome]))
+    _print_remarks(out, found, names)
+    print_closing(out, found, names, n_failed)
 
 
-def print_closing(console: Console, found: Sequence[Assessment], names: Sequence[str], n_failed: int) -> None:
+def print_closing(out: Lines, found: Sequence[Assessment], names: Sequence[str], n_failed: int) -> None:
     """Prints what was asked and found of all of them in one line, where limits were given."""
-    from rich.text import Text
-
     if (closing := _closing(found, names, n_failed)) is not None:
-        console.print(Text(closing[0], style=_STYLES[closing[1]]))
+        out.line((closing[0], _STYLES[closing[1]]))
 
 
 def _names(assessments: Sequence[Assessment]) -> list[str]:
@@ -133,10 +128,8 @@ def _alike(files: Sequence[str]) -> bool:
     return len({os.path.isabs(file) for file in files}) == 1
 
 
-def _print_remarks(console: Console, found: Sequence[Assessment], names: Sequence[str]) -> None:
+def _print_remarks(out: Lines, found: Sequence[Assessment], names: Sequence[str]) -> None:
     """Each kind of warning once, with the files it is of and the words of the first."""
-    from rich.text import Text
-
     kinds: dict[str, list[tuple[str, str]]] = {}
     for a, name in zip(found, names, strict=True):
         for warning in a.warnings:
@@ -144,7 +137,7 @@ def _print_remarks(console: Console, found: Sequence[Assessment], names: Sequenc
     for entries in kinds.values():
         of = list(dict.fromkeys(name for name, _ in entries))
         shown = ", ".join(of) if len(of) <= _NAMED else f"{len(of)} of {len(set(names))}, first {of[0]}"
-        console.print(Text(f"{shown}: ", style="yellow") + Text(entries[0][1]))
+        out.line((f"{shown}: {entries[0][1]}", "yellow"))
 
 
 def _closing(found: Sequence[Assessment], names: Sequence[str], n_failed: int) -> tuple[str, str] | None:

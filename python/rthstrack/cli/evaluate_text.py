@@ -6,17 +6,15 @@ import math
 import os
 from typing import TYPE_CHECKING
 
-from rthstrack.cli.evaluate_many import print_closing, print_many
+from rthstrack.cli.lines import Lines
 from rthstrack.cli.setting_options import spoken
+from rthstrack.values import quantile
 from rthstrack.verdict import display
 from rthstrack.verdict.display import with_interval
 from rthstrack.verdict.sentence import reason
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
-
-    from rich.console import Console
-    from rich.table import Table
 
     from rthstrack.evaluation.tracking import MovingTracking, Tracking
     from rthstrack.verdict.assessment import Assessment
@@ -36,19 +34,23 @@ _APART = {
 
 def print_text(results: Sequence[Sequence[Assessment]], n_files: int, n_failed: int, sort: str) -> None:
     """Prints one file's results in full, many files' in a table, and one closing line where limits were given."""
-    from rthstrack.cli.output import Console
-
-    console = Console()
+    out = Lines()
     found = [a for one in results for a in one]
     if n_files == 1:
         several = len({a.actuator for a in found}) > 1
         for a in found:
-            _print_one(console, a, several=several)
+            _print_one(out, a, several=several)
         if several:
-            print_closing(console, found, [called(a) for a in found], 0)
+            from rthstrack.cli.evaluate_many import print_closing
+
+            print_closing(out, found, [called(a) for a in found], 0)
     elif found:
+        from rthstrack.cli.evaluate_many import print_many
+
         # A table is as wide as it is told to be, in a pipe too.
-        print_many(Console(width=None) if "COLUMNS" in os.environ else console, found, n_failed, sort)
+        if "COLUMNS" in os.environ:
+            out.width = out.told_width()
+        print_many(out, found, n_failed, sort)
 
 
 def called(a: Assessment) -> str:
@@ -56,20 +58,14 @@ def called(a: Assessment) -> str:
     return f"actuator {a.actuator_number} ({a.actuator_name})"
 
 
-def _print_one(console: Console, a: Assessment, *, several: bool) -> None:
-    from rich.table import Table
-    from rich.text import Text
-
+def _print_one(out: Lines, a: Assessment, *, several: bool) -> None:
     t = a.tracking
     which = f"{called(a)}: " if several else ""
-    console.print(Text(f"{which}{_PARTS[a.part]}{a.verdict}", style="bold"))
-    console.print(Text(spoken(a.argument)))
-    console.print(_side_by_side(a))
-    table = Table(box=None, show_header=False, pad_edge=False)
-    table.add_column(style="dim", no_wrap=True)
-    table.add_column(overflow="fold")
+    out.line((f"{which}{_PARTS[a.part]}{a.verdict}", "bold"))
+    out.line(spoken(a.argument))
+    _print_side_by_side(out, a)
     band = "" if a.tracking.settings.band_hz is None else f", band {t.settings.band_hz}"
-    for label, value in (
+    rows = (
         ("file", f"{a.file}, {t.n_samples} samples at {a.rate_hz:g} Hz ({a.settings.get('rate_source', 'given')})"),
         ("target, measured", f"{a.target_name}, {a.measured_name}"),
         ("phase", _number(math.degrees(float(t.phase_rad)), ".5g", " degrees")),
@@ -81,29 +77,21 @@ def _print_one(console: Console, a: Assessment, *, several: bool) -> None:
         *_moving_rows(a),
         *_index_rows(a),
         *([("structure", a.loop.sentence)] if a.loop else []),
-    ):
-        table.add_row(label, Text(value))
-    console.print(table)
+    )
+    out.table(rows)
     for warning in a.warnings:
-        console.print(Text("warning: ", style="yellow") + Text(spoken(warning)))
+        out.line((f"warning: {spoken(warning)}", "yellow"))
     if a.outcome is not None:
-        console.print(Text(a.conclusion, style=_COLOURS[a.outcome]))
-    console.print()
+        out.line((a.conclusion, _COLOURS[a.outcome]))
+    out.line()
 
 
-def _side_by_side(a: Assessment) -> Table:
+def _print_side_by_side(out: Lines, a: Assessment) -> None:
     """The judged estimate, the trusted and the published one, with their 95 % intervals as far as there are any."""
-    from rich.table import Table
-    from rich.text import Text
-
     columns: list[Tracking] = []
     for t in (a.tracking, a.trusted, a.published):
         if not any(t is one for one in columns):
             columns.append(t)
-    table = Table(box=None, pad_edge=False)
-    table.add_column("", style="dim", no_wrap=True)
-    for t in columns:
-        table.add_column(_heading(a, t))
     rows = [
         ("amplitude", [_estimate(float(t.amplitude), t.amplitude_interval) for t in columns]),
         (
@@ -112,9 +100,7 @@ def _side_by_side(a: Assessment) -> Table:
         ),
         ("judged at", [_number(float(t.equivalent_frequency_hz), ".5g", " Hz") for t in columns]),
     ]
-    for label, cells in rows:
-        table.add_row(label, *map(Text, cells))
-    return table
+    out.table([(label, *cells) for label, cells in rows], ("", *(_heading(a, t) for t in columns)))
 
 
 def _heading(a: Assessment, t: Tracking) -> str:
@@ -150,7 +136,7 @@ def _windows_text(a: Assessment, moving: MovingTracking) -> str:
     if not known.any():
         return f"no window could be judged{_most_frequent(moving)}"
     delays, amplitudes = 1e3 * moving.delay_s[known], moving.amplitude[known]
-    (low, high), (small, large) = np.quantile(delays, (0.1, 0.9)), np.quantile(amplitudes, (0.1, 0.9))
+    (low, high), (small, large) = ([quantile(one, share) for share in (0.1, 0.9)] for one in (delays, amplitudes))
     return (
         f"of {moving.window_s:g} s{_moving_factors(a, moving)}: delay {low:.4g} to {high:.4g} ms, "
         f"amplitude {small:.4g} to {large:.4g} (the middle 80 % of {known.sum()} readings)"

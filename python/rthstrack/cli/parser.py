@@ -12,6 +12,9 @@ if TYPE_CHECKING:
 
 MISUSE = 2
 
+# argparse looks through the disk for translations of each of its words; all of ours are English.
+argparse._ = str  # type: ignore[attr-defined]
+
 
 class Formatter(argparse.RawDescriptionHelpFormatter):
     """Paragraphs filled to the width, but what is indented, such as examples, as it stands."""

@@ -29,7 +29,7 @@ from rthstrack.cli.progress import counted, stage
 from rthstrack.cli.quantities import positive, time
 from rthstrack.cli.setting_options import setting_options
 from rthstrack.errors import RthstrackError, SettingError
-from rthstrack.evaluation.factors import TOLERANCE
+from rthstrack.evaluation.inputs import TOLERANCE
 from rthstrack.evaluation.presets import PRESETS
 from rthstrack.evaluation.results import json_ready
 from rthstrack.evaluation.settings import StudyMethod

@@ -16,6 +16,7 @@ import numpy as np
 
 from rthstrack.evaluation.chance import f_above, t_975
 from rthstrack.evaluation.results import _Result
+from rthstrack.values import median, quantile
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -253,7 +254,7 @@ def _motion(target: Floats, measured: Floats, tracking: Tracking, trusted: Track
     spectra, energy, size = _spectra(target, measured, tracking)
     df = rate_hz / size
     # A noisy target is even over all frequencies.
-    floor = float(np.median(energy[energy.size // 2 :]))
+    floor = median(energy[energy.size // 2 :])
     energy = np.where(energy > 4 * floor, energy - floor, 0.0)
     low_hz, high_hz = trusted.settings.band_hz or (0.0, math.inf)
     f_all = df * np.arange(energy.size)
@@ -452,7 +453,7 @@ def _along(motion: _Motion, fit: _Fit, phi: Sequence[float], where: Interval, ga
 def _octaves(motion: _Motion) -> tuple[Level, Level] | None:
     """Large motion, and the smallest in which gain and delay can be told; each an octave of amplitude."""
     found: list[Level] = []
-    high = float(np.quantile(motion.amplitude, 0.995))
+    high = quantile(motion.amplitude, 0.995)
     for _ in range(8):
         low = high / 2
         if low < _CLEAR * motion.noise:
@@ -750,7 +751,7 @@ def _line(response: FrequencyResponse, values: Floats, std: Floats, motion: _Mot
         slope = float(centred @ y / (centred @ centred))
         rest = y - y.mean() - slope * centred
         worst, level = float(np.abs(rest).max()), max(abs(float(y.mean())), 1e-12)
-        if worst <= min(max(_STRAIGHT, 3 * float(np.median(s)) / level), _ROUGH) * level:
+        if worst <= min(max(_STRAIGHT, 3 * median(s) / level), _ROUGH) * level:
             at = min(max(motion.f_eq, float(x[0])), float(x[-1]))
             error = math.sqrt(float((centred**2) @ (s**2))) / float(centred @ centred)
             return Line(

@@ -15,7 +15,7 @@ from rthstrack._core import KeyFrequencies as CoreKeyFrequencies
 from rthstrack._core import choose_factors as core_choose_factors
 from rthstrack._core import prior_bounds as core_prior_bounds
 from rthstrack.errors import SignalError
-from rthstrack.evaluation.inputs import PUBLISHED, _count, _number, _samples, _single, merged, settled
+from rthstrack.evaluation.inputs import PUBLISHED, TOLERANCE, _count, _number, _samples, _single, merged, settled
 from rthstrack.evaluation.results import _Result
 from rthstrack.evaluation.settings import Settings
 from rthstrack.evaluation.tracking import _SPECTRA, Tracking, _plan, _tracked
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
     from rthstrack.evaluation.settings import EvaluationKeywords, OtherKeywords
 
-#: Largest relative change of amplitude and delay, unless told otherwise.
-TOLERANCE = 0.005
 #: Share of the weight that key frequencies hold, unless told otherwise.
 SHARE = 0.999
 

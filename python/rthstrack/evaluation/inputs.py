@@ -12,7 +12,6 @@ import numpy as np
 from rthstrack._core import usual_detrend
 from rthstrack.errors import SettingError, SignalError, UnknownSettingError
 from rthstrack.evaluation.settings import MonitorSettings, MovingSettings, Settings
-from rthstrack.keyed_table import suggestion
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -51,10 +50,14 @@ def merged(kind: type[_Kind], settings: DataclassInstance | None, changes: Mappi
         unknown = [name for name in given if name not in known]
         if not unknown:
             raise
+        from rthstrack.keyed_table import suggestion
+
         near = suggestion(unknown[0], known) or f"; there are: {', '.join(known)}"
         raise UnknownSettingError(f"unknown setting {', '.join(unknown)}{near}") from None
 
 
+#: Largest relative change of amplitude and delay by P and Q that are chosen, unless told otherwise.
+TOLERANCE = 0.005
 #: Settings of what is made of the published average alone.
 PUBLISHED = Settings(estimator="fei")
 

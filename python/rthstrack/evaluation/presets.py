@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Unpack
 from rthstrack.errors import SettingError
 from rthstrack.evaluation.inputs import merged
 from rthstrack.evaluation.settings import Settings
-from rthstrack.keyed_table import suggestion
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -29,6 +28,8 @@ def preset(name: str, **changes: Unpack[EvaluationKeywords]) -> Settings:
     Raises SettingError for an unknown name or setting, with those that there are.
     """
     if name not in PRESETS:
+        from rthstrack.keyed_table import suggestion
+
         raise SettingError(
             f"preset: expected one of {', '.join(PRESETS)}, found {name!r}{suggestion(str(name), PRESETS)}"
         )

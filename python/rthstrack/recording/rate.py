@@ -17,6 +17,7 @@ from rthstrack.recording.recording import select
 from rthstrack.recording.time_units import DOUBTED_SLOW_HZ, SECONDS, CountedIn, counted_in, rounded_step, unwrapped
 from rthstrack.said import Said
 from rthstrack.units import seconds_in, split_unit
+from rthstrack.values import median
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -315,7 +316,7 @@ def _no_time(contents: Contents) -> str:
     for one in (one for one in contents.series if _HINTS.search(one.name)):
         verdict = examine(one.values)
         if isinstance(verdict, Uniform) and abs(verdict.rate_hz - 1) > 1e-6:
-            rises = f"'{one.path}' rises evenly by {np.median(np.diff(one.values)):.6g}"
+            rises = f"'{one.path}' rises evenly by {median(np.diff(one.values)):.6g}"
             return f"the file states no sampling rate, and {rises}, but no name or unit says that it is the time"
     return none
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from dataclasses import dataclass, field, replace
@@ -341,6 +340,8 @@ def select(selector: str, channels: Sequence[tuple[str, str]], file: str) -> int
             f"no channel '{selector}': there are {len(channels)}, #0 to #{len(channels) - 1}: {listed}", file=file
         )
     by_text = {loose(text): i for i, both in enumerate(channels) for text in both}
+    import difflib  # nobody waits for it where nothing is wrong
+
     near = dict.fromkeys(by_text[text] for text in difflib.get_close_matches(loose(selector), by_text, n=3))
     meant = f" (did you mean {' or '.join(repr(channels[i][0]) for i in near)}?)" if near else ""
     raise ChannelError(f"no channel '{selector}'{meant}; there are: {listed}", file=file)

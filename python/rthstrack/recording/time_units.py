@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rthstrack.said import Said
+from rthstrack.values import median
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -50,7 +51,7 @@ def counted_in(stamps: NDArray[np.float64], stated_s: float | None) -> CountedIn
     if len(sound) < 4:
         return CountedIn(stated_s or 1.0)
     with np.errstate(all="ignore"):
-        step = abs(float(np.median(np.diff(sound))))
+        step = abs(median(np.diff(sound)))
     if not 0 < step < np.inf:
         return CountedIn(stated_s or 1.0)
     largest, span = float(np.abs(sound).max()), step * (len(stamps) - 1)
@@ -94,7 +95,7 @@ def unwrapped(stamps: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
         n_back = np.count_nonzero(back)
         if not n_back or n_back > len(steps) // 4 or not np.isfinite(stamps).all():
             return stamps, 0.0
-        step = float(np.median(steps[~back]))
+        step = median(steps[~back])
         for bound in _WRAPS:
             across = steps[back] + bound
             if float(np.ptp(stamps)) < bound and bool(np.all(np.abs(across - step) <= max(0.5 * step, 1))):

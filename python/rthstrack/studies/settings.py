@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rthstrack.errors import SettingError
-from rthstrack.evaluation.factors import TOLERANCE
-from rthstrack.evaluation.inputs import _count, _number, settled
+from rthstrack.evaluation.inputs import TOLERANCE, _count, _number, settled
 from rthstrack.evaluation.settings import Settings, StudyMethod, StudyMethodKeywords
 from rthstrack.evaluation.tracking import Evaluator
 

@@ -12,7 +12,7 @@ from rthstrack.verdict.sentence import _percent, _undetermined
 from rthstrack.verdict.variation import _MINOR_CHANGE, _in_words, _varying, _varying_slowly
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
@@ -32,6 +32,9 @@ _MINOR = 0.25
 _CLEAR_OF_NOISE = 16.0
 # Ends this near to the mean, in standard deviations, are no cause.
 _AT_MEAN = 0.1
+
+# Changes that are tried; another average last, as it costs the most.
+_SUSPECTS = ("bad_samples", "detrend", "window", "band")
 
 # What to do where the reason itself does not say, by its code.
 _ADVICE = {
@@ -65,7 +68,7 @@ def argument(
     trusted: Tracking,
     depends: Dependence | None,
     slopes: FrequencySlopes | None,
-    variants: Mapping[str, Tracking],
+    variant: Callable[[str], Tracking | None],
     found: Mapping[str, Said],
     unit: str | None = None,
     start_s: float = 0.0,
@@ -73,8 +76,8 @@ def argument(
     """Which number to use and why.
 
     `judged` is the estimate asked for, `beside` what stands beside the trusted one (the same, or the published
-    average), with weights; `variants` are `beside` with one setting changed. `unit` is target's; `start_s` the time of
-    the first sample.
+    average), with weights; `variant` makes `beside` with one setting changed, None where there is no such suspect.
+    `unit` is target's; `start_s` the time of the first sample.
     """
     if (missing := _undetermined(trusted)) is not None:
         said = "no number can be trusted here" if _undetermined(beside) is None else "there is no number to use"
@@ -99,7 +102,7 @@ def argument(
             return Argument(f"{this}{slowly}; {ours} agrees with it {_how_well(beside, trusted)}")
         without = f" ({trusted.reason})" if trusted.reason else ""
         return Argument(f"{ours} agrees with the trusted estimate {_how_well(beside, trusted)}{without}{slowly}")
-    causes = [_cause(target, beside, trusted, name, variants, found) for name in which]
+    causes = [_cause(target, beside, trusted, name, variant, found) for name in which]
     if len({change for change, _, _ in causes}) == 1:
         # One cause, told of the number that is off by most.
         at = max(range(len(which)), key=lambda i: _relative(which[i], beside, trusted))
@@ -176,7 +179,7 @@ def _cause(
     tracking: Tracking,
     trusted: Tracking,
     name: str,
-    variants: Mapping[str, Tracking],
+    variant: Callable[[str], Tracking | None],
     found: Mapping[str, Said],
 ) -> tuple[str | None, str | None, str]:
     """Why one number misses the trusted one: what is to blame, the warning that says it, and the cause in words.
@@ -184,11 +187,16 @@ def _cause(
     Each suspect is tried: what is left of the difference without it?
     """
     ours, theirs = float(getattr(tracking, name)), float(getattr(trusted, name))
-    readings = {change: float(getattr(variant, name)) for change, variant in variants.items()}
+    tried = {change: made for change in _SUSPECTS if (made := variant(change)) is not None}
+    readings = {change: float(getattr(made, name)) for change, made in tried.items()}
     if (averaged := _averaged(target, tracking, trusted, name)) is not None:
         # What averaging makes of a constant gain and delay, target's own noise and all, is taken off.
         readings["average"] = ours - averaged[1] + theirs
-    remains = {change: abs(reading - theirs) / abs(ours - theirs) for change, reading in readings.items()}
+
+    def remaining(reading: float) -> float:
+        return abs(reading - theirs) / abs(ours - theirs)
+
+    remains = {change: remaining(reading) for change, reading in readings.items()}
     if remains.get("bad_samples", 1.0) < _EXPLAINED and "bad_samples" in found:
         # All else that is tried still holds them.
         return "bad_samples", "bad_samples", f"because {found['bad_samples'].cause}"
@@ -196,8 +204,11 @@ def _cause(
     if remains.get("average", 1.0) < _FORETOLD:
         suspects.append("average")
     # Another average only tells that the difference is made before averaging, so it is the last to be asked.
-    if not suspects and remains.get("estimator", 1.0) < _EXPLAINED:
-        suspects = ["estimator"]
+    if not suspects and (aligned := variant("estimator")) is not None:
+        readings["estimator"] = float(getattr(aligned, name))
+        remains["estimator"] = remaining(readings["estimator"])
+        if remains["estimator"] < _EXPLAINED:
+            suspects = ["estimator"]
     if not suspects:
         return None, None, "and no single cause (drift, window, noise or large phases) explains that"
     # Noise on target that is there, and explains it, needs no help by the record's ends.
@@ -230,7 +241,7 @@ def _cause(
         where = _ENDS_APART if window == "boxcar" else _window_apart(window)
         return cause, None, f"because {where}: with --estimator aligned {reading}"
     if cause == "band":
-        low, high = variants["band"].settings.band_hz or (0.0, math.inf)
+        low, high = tried["band"].settings.band_hz or (0.0, math.inf)
         warning = "high_energy" if "high_energy" in found else None
         return (
             cause,
@@ -238,9 +249,9 @@ def _cause(
             f"because noise above {high:.3g} Hz counts as motion: with --band {low:g} {high:.3g} {reading}",
         )
     remedy = (
-        f"--detrend {variants[cause].settings.detrend}"
+        f"--detrend {tried[cause].settings.detrend}"
         if cause == "detrend"
-        else f"--window {variants[cause].settings.window}"
+        else f"--window {tried[cause].settings.window}"
     )
     if cause == "window" and window != "boxcar":
         return cause, None, f"because {_window_apart(window)}: with {remedy} {reading}"

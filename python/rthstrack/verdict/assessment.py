@@ -8,13 +8,14 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from threading import Thread
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rthstrack.errors import SettingError, SignalError
 from rthstrack.evaluation.dependence import dependence
-from rthstrack.evaluation.factors import TOLERANCE, choose_factors
 from rthstrack.evaluation.indices import index_histories, indices
-from rthstrack.evaluation.inputs import _number, _single, settled
+from rthstrack.evaluation.inputs import TOLERANCE, _number, _single, settled
 from rthstrack.evaluation.response import frequency_response, frequency_slopes
 from rthstrack.evaluation.settings import Settings
 from rthstrack.evaluation.time_frequency import TimeFrequency, time_frequency
@@ -30,7 +31,7 @@ from rthstrack.verdict.warnings import OF_PUBLISHED
 from rthstrack.verdict.warnings import warnings as found_warnings
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping
+    from collections.abc import Callable, Collection, Mapping, Sequence
 
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
@@ -44,6 +45,8 @@ if TYPE_CHECKING:
     from rthstrack.verdict.limits import Gate
     from rthstrack.verdict.loop import LoopEffect
     from rthstrack.virtual_test.parts import VirtualTest
+
+_T = TypeVar("_T")
 
 #: Length of a moving window unless told otherwise, in seconds, but never more than a quarter of the record.
 MOVING_S = 4.0
@@ -63,9 +66,9 @@ class Assessment(Value):
     and the evaluation's own settings. `warnings` and the notes are texts with `code` and `values`.
     `tracking`, `moving` are judged: by default `trusted`, `trusted_moving`, least squares on every sample, the same
     objects then. `published`, `published_moving` are the published average of the same window, band, P and Q, the same
-    objects where that was asked for. `variants`: where `beside` differs from the trusted estimate, it with one setting
-    changed, by what was changed ("detrend", "window", "band", "estimator"). `argument` says in one sentence which to
-    use, and why.
+    objects where that was asked for. `variants`: what was tried to tell why `beside` differs from the trusted estimate:
+    it with one setting changed, by what was changed ("detrend", "window", "band", "estimator"). `argument` says in one
+    sentence which to use, and why.
     `gates`: each limit with what was found, `conclusion` all of them in one line. `loop`: what the delay does to the
     structure, where one was given.
     """
@@ -222,37 +225,27 @@ def assess_samples(
         raise SignalError("there are no samples to judge: both channels are empty")
     factors = _chosen(t, m, rate_hz, settings, choose, tolerance) if choose else None
     for_record = settings if factors is None else factors.settings
+    asked = moving_s is not None or hop_s is not None
+    window_s = min(MOVING_S, t.size / rate_hz / 4) if moving_s is None else moving_s
+    hop_s = max(window_s / READINGS_PER_WINDOW, 1 / rate_hz) if hop_s is None else hop_s
+    for_windows = settled(settings if factors is None else factors.reference.settings)
+    of_trusted = trusted_settings(for_record, asked_for.expected_delay_s)
+    of_published = published_settings(asked_for)
+    of_windows = (for_windows, of_trusted, for_windows if settings.estimator == "fei" else of_published)
+    windows = _aside(partial(_windows, t, m, rate_hz, window_s, hop_s, of_windows))
     tracking = Evaluator(t.size, rate_hz, for_record).evaluate(t, m, weights=True)
     still = still_in_band(t, tracking) or no_motion(m)
     if still is not None:
         tracking = _without_numbers(tracking, still)
-    for_windows = tracking.settings if factors is None else factors.reference.settings
-    asked = moving_s is not None or hop_s is not None
-    window_s = min(MOVING_S, t.size / rate_hz / 4) if moving_s is None else moving_s
-    hop_s = max(window_s / READINGS_PER_WINDOW, 1 / rate_hz) if hop_s is None else hop_s
-    of_trusted = trusted_settings(for_record, asked_for.expected_delay_s)
     trusted = tracking
     if tracking.settings != of_trusted:
         trusted = Evaluator(t.size, rate_hz, of_trusted).evaluate(t, m)
         if still is not None:
             trusted = _without_numbers(trusted, still)
     _check_limits(limits, trusted)
-    of_published = published_settings(asked_for)
     published = tracking
     if settings.estimator != "fei":
         published = _published(t, m, of_published, tracking, still)
-    moving, trusted_moving, published_moving, moving_note = None, None, None, None
-    try:
-        moving = trusted_moving = published_moving = _moving(t, m, rate_hz, window_s, hop_s, for_windows)
-    except (SettingError, SignalError) as error:
-        if asked:
-            raise error.reworded(f"moving windows of {window_s:g} s: {error}") from None
-        moving_note = failed(error)
-    # What stands beside may fail where the judged windows do not.
-    if tracking.settings != of_trusted:
-        trusted_moving = _moving_beside(t, m, rate_hz, window_s, hop_s, of_trusted)
-    if settings.estimator != "fei":
-        published_moving = _moving_beside(t, m, rate_hz, window_s, hop_s, of_published)
     # Curves over frequency and what gain and delay depend on need every sample.
     beside = published if tracking.settings == of_trusted else tracking
     raw, without_bad = (t, m), beside
@@ -277,14 +270,26 @@ def assess_samples(
     names = (target_name, measured_name)
     units = (unit, measured_unit or unit)
     found_indices = indices(t, m, rate_hz)
+    moving, trusted_moving, published_moving, moving_note = None, None, None, None
+    try:
+        moving, trusted_moving, published_moving = windows()
+    except (SettingError, SignalError) as error:
+        if asked:
+            raise error.reworded(f"moving windows of {window_s:g} s: {error}") from None
+        moving_note = failed(error)
     warnings = found_warnings(
         t, m, tracking, published, trusted, moving, response, found_indices.rms_error_percent, depends, units, names
     )
     suspect = "mean" if "offset" in warnings and "drift" not in warnings else "linear"
-    variants = _variants(t, m, beside, of_trusted, slopes, suspect) if differ(beside, trusted) else {}
-    if without_bad is not beside:
-        variants["bad_samples"] = without_bad
-    argument = argued(t, tracking, beside, trusted, depends, slopes, variants, warnings, unit, start_s)
+    changes = _changes(beside.settings, of_trusted, slopes, suspect) if differ(beside, trusted) else {}
+    variants: dict[str, Tracking | None] = {} if without_bad is beside else {"bad_samples": without_bad}
+
+    def variant(name: str) -> Tracking | None:
+        if name in changes and name not in variants:
+            variants[name] = _variant(t, m, beside, changes[name])
+        return variants.get(name)
+
+    argument = argued(t, tracking, beside, trusted, depends, slopes, variant, warnings, unit, start_s)
     copy = warnings.get("copy")
     loop = None if structure is None or copy is not None else _loop(structure, trusted)
     if loop is not None and limits.critical_delay_s is None:
@@ -311,7 +316,7 @@ def assess_samples(
         trusted_moving=trusted_moving,
         published=published,
         published_moving=published_moving,
-        variants=variants,
+        variants={name: found for name, found in variants.items() if found is not None},
         response=response,
         response_note=response_note,
         slopes=slopes,
@@ -389,15 +394,51 @@ def _check_limits(limits: Limits, trusted: Tracking) -> None:
     limits.check(*min(bounds))
 
 
-def _moving(
+def _windows(
     target: NDArray[np.float64],
     measured: NDArray[np.float64],
     rate_hz: float,
     window_s: float,
     hop_s: float,
-    settings: Settings,
-) -> MovingTracking:
-    return evaluate_moving(target, measured, rate_hz, settings, window_s=window_s, hop_s=hop_s)
+    settings: Sequence[Settings],
+) -> list[MovingTracking | None]:
+    """The moving windows of each of the settings, those of equal ones once.
+
+    The first must be; what stands beside may fail where the judged windows do not, and is None then.
+    """
+    found: dict[Settings, MovingTracking | None] = {}
+    for one in settings:
+        if one in found:
+            continue
+        try:
+            found[one] = evaluate_moving(target, measured, rate_hz, one, window_s=window_s, hop_s=hop_s)
+        except (SettingError, SignalError):
+            if not found:
+                raise
+            found[one] = None
+    return [found[one] for one in settings]
+
+
+def _aside(make: Callable[[], _T]) -> Callable[[], _T]:
+    """Begins it on another thread: the core holds no lock. What is returned waits for its value or error."""
+    outcome: list[_T | BaseException] = []
+
+    def run() -> None:
+        try:
+            outcome.append(make())
+        except BaseException as error:
+            outcome.append(error)
+
+    thread = Thread(target=run)
+    thread.start()
+
+    def wait() -> _T:
+        thread.join()
+        if isinstance(outcome[0], BaseException):
+            raise outcome[0]
+        return outcome[0]
+
+    return wait
 
 
 def _published(
@@ -413,20 +454,6 @@ def _published(
     except (SettingError, SignalError) as error:
         return dataclasses.replace(_without_numbers(tracking, failed(error)), settings=settings)
     return found if still is None else _without_numbers(found, still)
-
-
-def _moving_beside(
-    target: NDArray[np.float64],
-    measured: NDArray[np.float64],
-    rate_hz: float,
-    window_s: float,
-    hop_s: float,
-    settings: Settings,
-) -> MovingTracking | None:
-    try:
-        return _moving(target, measured, rate_hz, window_s, hop_s, settings)
-    except (SettingError, SignalError):
-        return None
 
 
 def _response(
@@ -453,16 +480,10 @@ def _response(
     return None, note
 
 
-def _variants(
-    target: NDArray[np.float64],
-    measured: NDArray[np.float64],
-    tracking: Tracking,
-    trusted: Settings,
-    slopes: FrequencySlopes | None,
-    detrend: str,
-) -> dict[str, Tracking]:
-    """The evaluation with one thing changed, each a suspect where it and the trusted estimate differ."""
-    settings = tracking.settings
+def _changes(
+    settings: Settings, trusted: Settings, slopes: FrequencySlopes | None, detrend: str
+) -> dict[str, dict[str, Any]]:
+    """What may be changed of an evaluation, each a suspect where it and the trusted estimate differ."""
     changes: dict[str, dict[str, Any]] = {
         "window": {"window": "hann" if settings.window == "boxcar" else "boxcar"},
         "estimator": {
@@ -478,13 +499,17 @@ def _variants(
     if slopes is not None:
         low, high = settings.band_hz or (0.0, math.inf)
         changes["band"] = {"band_hz": (low, min(high, slopes.band_hz[1]))}
-    found = {}
-    for name, change in changes.items():
-        try:
-            found[name] = Evaluator(target.size, tracking.rate_hz, settings, **change).evaluate(target, measured)
-        except (SettingError, SignalError):
-            continue  # nothing is left to judge by: no suspect
-    return found
+    return changes
+
+
+def _variant(
+    target: NDArray[np.float64], measured: NDArray[np.float64], tracking: Tracking, change: dict[str, Any]
+) -> Tracking | None:
+    """The evaluation with one thing changed, or None where nothing is left to judge by."""
+    try:
+        return Evaluator(target.size, tracking.rate_hz, tracking.settings, **change).evaluate(target, measured)
+    except (SettingError, SignalError):
+        return None
 
 
 def _chosen(
@@ -495,6 +520,8 @@ def _chosen(
     choose: Collection[str],
     tolerance: float,
 ) -> Factors:
+    from rthstrack.evaluation.factors import choose_factors
+
     if unknown := [name for name in choose if name not in ("P", "Q")]:
         raise SettingError(f"choose takes P and Q, not {unknown[0]!r}")
     p, q = settings.data_decimation, settings.frequency_decimation

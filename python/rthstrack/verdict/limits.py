@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -145,8 +145,7 @@ class Gate:
         }
 
 
-@dataclass(frozen=True, slots=True)
-class _Kind:
+class _Kind(NamedTuple):
     """What is limited: from the tracking's number and interval to the number that a limit is held against."""
 
     name: str
@@ -167,8 +166,7 @@ _AMPLITUDE = _Kind("amplitude", "amplitude", "|amplitude - 1|", "", 1.0, lambda 
 _CRITICAL = _Kind("critical_delay", "delay_s", "delay", " ms", 1e3, lambda d: d, is_signed=True)
 
 
-@dataclass(frozen=True, slots=True)
-class _Row:
+class _Row(NamedTuple):
     """A limit; of a critical delay the delay itself, of which the limit may be a share."""
 
     kind: _Kind
@@ -301,8 +299,7 @@ def _held_one(row: _Row, tracking: Tracking) -> Held:
     return _held(row, float(getattr(tracking, name)), float(interval[0]), float(interval[1]))
 
 
-@dataclass(frozen=True, slots=True)
-class _Windows:
+class _Windows(NamedTuple):
     """All moving windows against one limit."""
 
     state: str

@@ -11,6 +11,7 @@ from rthstrack.evaluation.bad_samples import BadSamples
 from rthstrack.recording.copies import is_copy
 from rthstrack.said import Said
 from rthstrack.units import length_factor
+from rthstrack.values import median, n_distinct, quantile
 from rthstrack.verdict.difference import _SAME_DELAY_S
 from rthstrack.verdict.limits import motion_in_windows
 from rthstrack.verdict.sentence import _percent, _undetermined
@@ -159,7 +160,7 @@ def _offset(
     if _undetermined(trusted) is not None or units[0] != units[1]:
         return None
     # The median, of which a spike is no part.
-    off = float(np.median(measured - float(trusted.amplitude) * target))
+    off = median(measured - float(trusted.amplitude) * target)
     if abs(off) < _STANDS_OFF * float(target.std()):
         return None
     unit = f" {units[0]}" if units[0] else ""
@@ -270,7 +271,7 @@ def _delay_spread(tracking: Tracking, trusted: Tracking, response: FrequencyResp
     delays, frequency = response.delay_s[carrying], response.frequency_hz[carrying]
     if delays.size < 3:
         return None
-    low, high = np.quantile(delays, (0.1, 0.9))
+    low, high = (quantile(delays, share) for share in (0.1, 0.9))
     # Less than a hundredth of a turn at the top is no finding.
     if high - low < max(_DELAY_SPREAD * abs(float(tracking.delay_s)), 0.01 / float(frequency[-1])):
         return None
@@ -350,13 +351,13 @@ def _clipped(signal: NDArray[np.float64], name: str, code: str) -> Said | None:
 
 def _levels(target: NDArray[np.float64], name: str) -> Said | None:
     # Counting stops as soon as there are enough.
-    if np.unique(target[: 20 * _FEW_LEVELS]).size > _FEW_LEVELS or (n := np.unique(target).size) > _FEW_LEVELS:
+    if n_distinct(target[: 20 * _FEW_LEVELS]) > _FEW_LEVELS or (n := n_distinct(target)) > _FEW_LEVELS:
         return None
     if target.size < 4 * _FEW_LEVELS:
         return None
     steps = np.abs(np.diff(target))
     # What jumps through most of its range at once is a square wave.
-    if float(np.median(steps[steps > 0])) > 0.5 * float(np.ptp(target)):
+    if median(steps[steps > 0]) > 0.5 * float(np.ptp(target)):
         return None
     words = f"{name} is small: it takes only {n} distinct values, so quantisation limits the accuracy"
     return Said(words, "few_levels", [n])

@@ -58,13 +58,23 @@ class Format(NamedTuple):
         return found
 
 
+# A module is loaded to look closer, where a word or signature speaks for its format.
+
+
 def _is_at2(b: Beginning) -> bool:
+    if b.file.suffix.lower() != ".at2":
+        with b.file.open("rb") as opened:
+            if b"NPTS" not in opened.read(4096).upper():
+                return False
     from rthstrack.recording.readers import at2
 
     return at2.recognised(b.file)
 
 
 def _is_accelerogram(b: Beginning) -> bool:
+    text = b.head.lower()
+    if not any(word in text for word in (b"accel", b"event_name:", b"sampling_interval_s:", b"origin time")):
+        return False
     from rthstrack.recording.readers import accelerograms
 
     return accelerograms.kind(b.head) is not None
@@ -76,6 +86,8 @@ def _is_tdm(b: Beginning) -> bool:
 
 
 def _is_workbook(b: Beginning) -> bool:
+    if not b.starts(b"PK\3\4", b"\xd0\xcf\x11\xe0"):
+        return False
     from rthstrack.recording.readers import excel
 
     return b.starts(b"\xd0\xcf\x11\xe0") or (b.starts(b"PK\3\4") and excel.recognised(b.file))

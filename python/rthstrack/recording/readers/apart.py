@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import subprocess
 import sys
@@ -52,6 +53,7 @@ def read_apart(module: str, path: Path, out: str, called: str) -> None:
 def work(read: Callable[[], None], file_bytes: int) -> int:
     """What such a process does; what is wrong goes to standard error, one line. Returns the exit status."""
     _limit_memory(file_bytes)
+    gc.disable()  # one file is read, and that is all
     try:
         read()
     except Exception as error:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rthstrack.values import median
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -158,8 +160,8 @@ def _nice(rate: float, low: float, high: float) -> float:
 
 def _describe(stamps: NDArray[np.float64], steps: NDArray[np.float64], unit_s: float) -> Irregular:
     """Which steps are odd, how many, where first, and the steps' statistics."""
-    median = float(np.median(steps))
-    usual = median if median > 0 else float(stamps[-1] - stamps[0]) / len(steps)
+    middle = median(steps)
+    usual = middle if middle > 0 else float(stamps[-1] - stamps[0]) / len(steps)
     back, repeats, jumps = steps < 0, steps == 0, steps > 1.5 * abs(usual)
     jitter = ~(back | repeats | jumps) & (np.abs(steps - usual) > _JITTER * abs(usual))
     kinds = [(back, "step(s) back"), (repeats, "repeat(s)"), (jumps, "jump(s)"), (jitter, "step(s) of odd length")]
@@ -167,7 +169,7 @@ def _describe(stamps: NDArray[np.float64], steps: NDArray[np.float64], unit_s: f
     odd = back | repeats | jumps | jitter
     where = f" (first at sample {int(odd.argmax()) + 1})" if odd.any() else ""
     said = ", ".join(f"{count} {words}" for count, words in counts if count) or "a step that drifts"
-    low, mid, high = (f"{float(v) * unit_s:.6g}" for v in (steps.min(), median, steps.max()))
+    low, mid, high = (f"{float(v) * unit_s:.6g}" for v in (steps.min(), middle, steps.max()))
     span = float(stamps[-1] - stamps[0]) * unit_s
     return Irregular(
         f"is not uniform: {said} among {len(steps)} steps{where}; steps in s: median {mid}, least {low}, greatest "
