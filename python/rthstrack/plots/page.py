@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 _FORMATS = ("png", "pdf", "svg")
 # Room for labels and numbers around the axes, in inches: fixed, as measuring them takes half of the time.
-_LEFT, _RIGHT, _RIGHT_AXIS, _TOP, _BOTTOM, _BETWEEN = 0.62, 0.12, 0.62, 0.27, 0.43, 0.14
+_LEFT, _RIGHT, _RIGHT_AXIS, _TOP, _BOTTOM = 0.62, 0.12, 0.62, 0.27, 0.43
 # Narrower figures have one panel a row.
 _TWO_COLUMNS_IN = 5.0
 # Up to so many figures are drawn here: starting a process takes as long.
@@ -157,7 +157,8 @@ def write_figures(
     from concurrent.futures import ProcessPoolExecutor
 
     # A process that was split off would inherit locks that threads of this one hold.
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=context) as pool:
         waiting = [pool.submit(write_figure, a, path, panels=panels, size_in=size_in) for a, path in figures]
         if meanwhile is not None:
             meanwhile()

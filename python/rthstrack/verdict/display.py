@@ -5,7 +5,6 @@ Nothing here changes a result; every function only chooses how a result is shown
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -153,15 +152,22 @@ def extremes(columns: Sequence[NDArray[np.floating]], edges: NDArray[np.intp]) -
 
     A group with NaN keeps the first of them too, so that a gap stays a gap.
     """
-    keep = {0, int(edges[-1]) - 1}
+    starts, n = edges[:-1], int(edges[-1])
+    sizes = np.diff(edges)
+    group = np.repeat(np.arange(starts.size), sizes)
+    keep = [np.array([0, n - 1])]
     for column in columns:
+        column = column[:n]
         missing = np.isnan(column)
-        low = np.where(missing, np.inf, column)
-        high = np.where(missing, -np.inf, column)
-        gaps = bool(missing.any())
-        for first, end in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
-            keep.add(first + int(low[first:end].argmin()))
-            keep.add(first + int(high[first:end].argmax()))
-            if gaps and math.isnan(column[first:end].sum()):
-                keep.add(first + int(missing[first:end].argmax()))
-    return np.array(sorted(keep), dtype=np.intp)
+        for end, empty in ((np.minimum, np.inf), (np.maximum, -np.inf)):
+            values = np.where(missing, empty, column)
+            keep.append(_firsts(values == np.repeat(end.reduceat(values, starts), sizes), group))
+        if missing.any():
+            keep.append(_firsts(missing, group))
+    return np.unique(np.concatenate(keep)).astype(np.intp)
+
+
+def _firsts(hits: NDArray[np.bool_], group: NDArray[np.intp]) -> NDArray[np.intp]:
+    """The first hit of every group that has one."""
+    places = np.flatnonzero(hits)
+    return places[np.unique(group[places], return_index=True)[1]]
