@@ -53,6 +53,8 @@ Floats = NDArray[np.float64]
 WINDOW_S, HOP_S = 4.0, 0.25
 WINDOWS = ("boxcar", "hann", "hamming", "blackman", "flattop", "tukey")
 HANN: dict[str, Any] = {"window": "hann"}
+#: The bounds that estimates are held against are those of samples from which nothing is subtracted.
+PLAIN: dict[str, Any] = {"detrend": "none"}
 #: What is compared, by the names of the tables.
 OURS: dict[str, dict[str, Any]] = {
     "`least_squares`": {"estimator": "least_squares"},
@@ -151,14 +153,14 @@ class Run:
 
     def evaluate(self, target: Floats, measured: Floats, rate_hz: float, settings: dict[str, Any]) -> Floats:
         """Gain and delay with their intervals, (6,): gain, low, high, delay, low, high; NaN where not determined."""
-        return self._numbers(self.tool.evaluate(target, measured, rate_hz, **settings), ())
+        return self._numbers(self.tool.evaluate(target, measured, rate_hz, **PLAIN | settings), ())
 
     def moving(
         self, target: Floats, measured: Floats, rate_hz: float, settings: dict[str, Any], hop_s: float = WINDOW_S
     ) -> Floats:
         """The same of moving windows, (n, 6)."""
         found = self.tool.evaluate_moving(
-            target, measured, rate_hz, window_s=WINDOW_S, hop_s=hop_s, minimum_std_ratio=0.05, **settings
+            target, measured, rate_hz, window_s=WINDOW_S, hop_s=hop_s, minimum_std_ratio=0.05, **PLAIN | settings
         )
         return self._numbers(found, (len(found.time_s),))
 

@@ -248,7 +248,7 @@ def test_a_folder_is_refused(capsys: pytest.CaptureFixture[str], recorded: Path)
     assert err == [f"rthstrack: {recorded.parent}: a folder; one test is sent at a time; name one of its files"]
     status, err = run(capsys, "--to", "udp://127.0.0.1:5005")
     assert status == 2
-    assert "required: FILE" in err[-1]
+    assert "required: FILE" in err[0]
 
 
 @pytest.mark.parametrize(
