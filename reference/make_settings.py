@@ -97,8 +97,10 @@ def settings_module() -> str:
     factors = [row for row in evaluation if row["name"].endswith("_decimation")]
     others = [row for row in evaluation if row not in factors]
     # The subject of a study is the published average.
-    of_study = {"estimator": "fei"}
-    study = [{**row, "default": of_study.get(row["name"], row["default"])} for row in evaluation if row["in_study"]]
+    study = [row.copy() for row in evaluation if row["in_study"]]
+    for row in study:
+        if row["name"] == "estimator":
+            row["default"] = "fei"
     by_keyword = [row for row in monitor if row["name"] not in ("rate_hz", "window_s", "update_hz")]
     of_monitor = "A monitor's settings by name; P may be None, to be chosen for the band."
     parts = [
