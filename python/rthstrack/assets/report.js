@@ -356,7 +356,7 @@
   const tabs = [...document.querySelectorAll('[role="tab"]')];
   const panels = [...document.querySelectorAll(".assessment")];
 
-  function select(number, focus) {
+  function select(number, focus, show = true) {
     panels.forEach((panel, i) => {
       panel.hidden = i !== number;
     });
@@ -369,7 +369,7 @@
     });
     if (tabs[number]) {
       if (focus) tabs[number].focus();
-      tabs[number].scrollIntoView({ block: "nearest", inline: "nearest" });
+      if (show) tabs[number].scrollIntoView({ block: "nearest", inline: "nearest" });
     }
     draw(number);
   }
@@ -441,6 +441,7 @@
     return number < panels.length ? number : worst;
   }
   addEventListener("hashchange", () => select(fromAddress(), false));
-  select(fromAddress(), false);
+  /* A page that is opened as a whole begins at its head. */
+  select(fromAddress(), false, location.hash !== "");
   document.documentElement.dataset.ready = "true";
 })();
