@@ -107,6 +107,6 @@ def test_the_glossary_has_the_words_that_are_printed(root: Path) -> None:
 
     glossary = (root / "docs/glossary.md").read_text(encoding="utf-8")
     words = [name for name, *_ in display.INDICES]
-    words += [*display.ESTIMATORS, *display.ESTIMATORS.values(), *limits._CONCLUSIONS, *limits._CONCLUSIONS.values()]
+    words += [*display.ESTIMATORS, *display.ESTIMATORS.values(), *limits.CONCLUSIONS, *limits.CONCLUSIONS.values()]
     words += [*warnings._BAD_WORDS, "held"]
     assert [word for word in words if word not in glossary] == []

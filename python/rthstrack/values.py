@@ -151,6 +151,12 @@ def quantile(values: np.ndarray[Any, Any], share: float) -> float:
     return float(low + part * (high - low) if part < 0.5 else high - (1 - part) * (high - low))
 
 
+def stretches(where: np.ndarray[Any, Any]) -> list[tuple[int, int]]:
+    """First and one past last of every run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], where, [False])).astype(np.int8))).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
 def n_distinct(values: np.ndarray[Any, Any]) -> int:
     """How many different numbers there are."""
     ordered = np.sort(values)

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from rthstrack.said import coded
 from rthstrack.verdict.display import shortened, with_interval
-from rthstrack.verdict.limits import CANNOT_BE_JUDGED
-from rthstrack.verdict.order import WORST, in_order
+from rthstrack.verdict.limits import CONCLUSIONS, reasons
+from rthstrack.verdict.order import HAPPENED, in_order
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -145,14 +145,12 @@ def _closing(found: Sequence[Assessment], names: Sequence[str], n_failed: int) -
     counted = Counter(a.outcome for a in found if a.outcome is not None)
     if not counted:
         return None
-    state = next(one for one in (*WORST, "passed") if counted[one])
+    state = next(one for one in HAPPENED if counted[one])
     n = sum(counted.values())
     worst, name = next((a, name) for a, name in zip(found, names, strict=True) if a.outcome == state)
-    words = {"exceeded": "exceed a limit", "not_judged": "cannot be judged", "passed": "are within the limits"}
-    parts = [f"{counted[one]} of {n + n_failed} {words[one]}" for one in (*WORST, "passed") if counted[one]]
-    heading = worst.conclusion.partition(": ")[0]
+    parts = [f"{counted[one]} of {n + n_failed} {words}" for one, (_, words) in HAPPENED.items() if counted[one]]
     if n_failed:
         parts.insert(0, f"{n_failed} of {n + n_failed} could not be read")
         if state == "passed":
-            state, heading = "not_judged", CANNOT_BE_JUDGED
-    return f"{heading}: {', '.join(parts)}; {name}: {worst.conclusion.partition(': ')[2]}", state
+            state = "not_judged"
+    return f"{CONCLUSIONS[state]}: {', '.join(parts)}; {name}: {reasons(worst.gates)}", state

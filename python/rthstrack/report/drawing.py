@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rthstrack.evaluation.results import json_ready
+from rthstrack.values import stretches
 from rthstrack.verdict import display
 
 if TYPE_CHECKING:
@@ -202,11 +203,9 @@ def _moving_drawing(a: Assessment, blocks: Blocks, budget: Budget) -> dict[str, 
     if a.trusted_moving is not None:
         columns |= _trusted_columns(a.trusted_moving)
     kept = _kept_points(list(columns.values()), budget)
-    edges = np.flatnonzero(np.diff(np.concatenate(([True], m.valid, [True])).astype(np.int8)))
     half = m.hop_s / 2
     invalid = [
-        [a.start_s + m.time_s[first] - half, a.start_s + m.time_s[end - 1] + half]
-        for first, end in zip(edges[::2], edges[1::2], strict=True)
+        [a.start_s + m.time_s[first] - half, a.start_s + m.time_s[end - 1] + half] for first, end in stretches(~m.valid)
     ]
     return {
         "n": m.time_s.size,

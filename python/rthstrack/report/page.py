@@ -26,7 +26,8 @@ from rthstrack.report.record import NOT_DETERMINED, _reasons, _why, result_recor
 from rthstrack.report.written import _interval, _number, _setting, flat
 from rthstrack.verdict import display
 from rthstrack.verdict.assessment import Assessment
-from rthstrack.verdict.order import in_order
+from rthstrack.verdict.limits import CONCLUSIONS
+from rthstrack.verdict.order import HAPPENED, in_order
 from rthstrack.verdict.sentence import reason
 
 if TYPE_CHECKING:
@@ -114,19 +115,11 @@ def report_html(assessments: Assessment | Sequence[Assessment]) -> str:
     return "\n".join(parts)
 
 
-_WORDS = {
-    "exceeded": ("exceeds a limit", "exceed a limit"),
-    "not_judged": ("cannot be judged", "cannot be judged"),
-    "passed": ("is within the limits", "are within the limits"),
-}
-_HEADS = {"exceeded": "FAIL", "not_judged": "CANNOT BE JUDGED", "passed": "PASS"}
-
-
 def _title(assessments: Sequence[Assessment]) -> str:
     """What became of the limits where there are some, and the judged numbers: of one pair, or the range of several."""
     outcomes = Counter(a.outcome for a in assessments if a.outcome is not None)
-    worst = next((state for state in _WORDS if outcomes[state]), None)
-    opening = "" if worst is None else f"{_HEADS[worst]} \N{MIDDLE DOT} "
+    worst = next((state for state in HAPPENED if outcomes[state]), None)
+    opening = "" if worst is None else f"{CONCLUSIONS[worst]} \N{MIDDLE DOT} "
     amplitude, delay = (
         _range([factor * float(getattr(a.tracking, name)) for a in assessments], unit)
         for name, factor, unit in (("amplitude", 1.0, ""), ("delay_s", 1e3, " ms"))
@@ -137,7 +130,7 @@ def _title(assessments: Sequence[Assessment]) -> str:
     n_files = len({a.file for a in assessments})
     what = f"{len(assessments)} pairs in {n_files} {'file' if n_files == 1 else 'files'}"
     told = ", ".join(
-        f"{outcomes[state]} {words[outcomes[state] > 1]}" for state, words in _WORDS.items() if outcomes[state]
+        f"{outcomes[state]} {words[outcomes[state] > 1]}" for state, words in HAPPENED.items() if outcomes[state]
     )
     return f"{opening}{what}: {told or numbers}"
 

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rthstrack.errors import SettingError
-from rthstrack.said import Said
+from rthstrack.said import Said, of_core
+from rthstrack.values import stretches
 from rthstrack.verdict.sentence import _undetermined
 
 if TYPE_CHECKING:
@@ -187,8 +188,8 @@ def gates(
     """Each limit held against an estimate and its moving windows.
 
     target: (n_samples,), which tells in which windows there is something to judge. An estimate that is not the trusted
-    one passes nothing that the trusted one does not pass. `copy` says that measured
-    is a copy of target, which passes nothing; start_s: the recording's time at the first sample.
+    one passes nothing that the trusted one does not pass. `copy` says that measured is a copy of target, which passes
+    nothing; start_s: the recording's time at the first sample.
     """
     rows = limits._rows()
     motion = None if moving is None or not rows else motion_in_windows(target, moving)
@@ -358,9 +359,9 @@ class _Windows(NamedTuple):
 
 def _says(held: Held, limit: float, strongly: bool) -> bool:
     """Whether a window's number says something of the limit."""
-    if math.isnan(held.value) or held.state == EXCEEDED:
-        return held.state == EXCEEDED
-    if held.high - held.low > limit:
+    if held.state == EXCEEDED:
+        return True
+    if math.isnan(held.value) or held.high - held.low > limit:
         return False
     return strongly or held.state == PASSED or held.value > limit
 
@@ -369,13 +370,14 @@ def _unknown(
     moving: MovingTracking, undetermined: NDArray[np.bool_], strongly: NDArray[np.bool_], start_s: float
 ) -> tuple[float, float, str] | None:
     """The longest stretch, of a window at least, in which target moves strongly and no window has a number; and why."""
-    missing = undetermined & strongly
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], missing, [False])).astype(np.int8)))
-    runs = [(int(b - a), int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    _, first, end = max(runs, default=(0, 0, 0))
+    _, first, end = max(
+        ((end - first, first, end) for first, end in stretches(undetermined & strongly)), default=(0, 0, 0)
+    )
     if (end - first) * moving.hop_s < moving.window_s:
         return None
-    why = str(moving.reason[(first + end) // 2]).partition(": ")[2] or "measured does not move"
+    middle = (first + end) // 2
+    said: Any = (moving.reason[middle], moving.reason_code[middle], moving.reason_values[middle])
+    why = of_core(*said).cause or "measured does not move"
     return start_s + float(moving.time_s[first]), start_s + float(moving.time_s[end - 1]), why
 
 
@@ -394,8 +396,7 @@ def motion_in_windows(target: Floats, moving: MovingTracking) -> Floats:
 
 def _runs(times: Floats, over: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
     """From when to when windows in a row are over the limit."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], over, [False])).astype(np.int8)))
-    return tuple((float(times[a]), float(times[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True))
+    return tuple((float(times[first]), float(times[end - 1])) for first, end in stretches(over))
 
 
 def _missing(windows: _Windows) -> str:
@@ -432,15 +433,18 @@ def _told(row: _Row, held: Held) -> str:
     return f"{value}{row.kind.unit} ({low} to {high})"
 
 
-CANNOT_BE_JUDGED = "CANNOT BE JUDGED"
-_CONCLUSIONS = {PASSED: "PASS", EXCEEDED: "FAIL", NOT_JUDGED: CANNOT_BE_JUDGED}
+#: What a state is called where people read it.
+CONCLUSIONS = {PASSED: "PASS", EXCEEDED: "FAIL", NOT_JUDGED: "CANNOT BE JUDGED"}
 
 
 def conclusion(found: Sequence[Gate]) -> str:
     """What was asked, what was found, passed or not, in one line; nothing where nothing is limited."""
     state = outcome(found)
-    if state is None:
-        return ""
-    # What decides comes first, and one sentence that all gates share is said once.
-    order = sorted(found, key=lambda gate: gate.state != state)
-    return f"{_CONCLUSIONS[state]}: {'; '.join(dict.fromkeys(str(gate.reason) for gate in order))}"
+    return "" if state is None else f"{CONCLUSIONS[state]}: {reasons(found)}"
+
+
+def reasons(found: Sequence[Gate]) -> str:
+    """Why, of all gates: what decides comes first, and one sentence that they share is said once."""
+    decides = outcome(found)
+    order = sorted(found, key=lambda gate: gate.state != decides)
+    return "; ".join(dict.fromkeys(str(gate.reason) for gate in order))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from rthstrack.verdict.limits import EXCEEDED, NOT_JUDGED
+from rthstrack.verdict.limits import EXCEEDED, NOT_JUDGED, PASSED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -14,6 +14,12 @@ if TYPE_CHECKING:
 
 #: What many results may be sorted by.
 SORTED_BY = ("worst", "given", "file", "delay", "amplitude", "error")
+#: What one result, or several of them, do by their outcome, worst first.
+HAPPENED = {
+    EXCEEDED: ("exceeds a limit", "exceed a limit"),
+    NOT_JUDGED: ("cannot be judged", "cannot be judged"),
+    PASSED: ("is within the limits", "are within the limits"),
+}
 #: Outcomes that come before all others, worst first.
 WORST = (EXCEEDED, NOT_JUDGED)
 
